@@ -1,0 +1,976 @@
+//! What the comparison found, told four ways: `report.json` for programs, `report.html` and the
+//! pictures for people, a table for the terminal.
+
+use std::io::{self, Cursor};
+use std::path::Path;
+use std::{fs, process};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::error::{ParameterError, ParameterErrorKind};
+use image::{ImageError, ImageFormat, ImageResult, Rgb32FImage, RgbImage};
+use serde_json::{Map, Value, json};
+
+use crate::metrics::{Layer, PIXELS_PER_DEGREE};
+
+/// How much the difference pictures are amplified.
+pub const DIFFERENCE_GAIN: f32 = 10.0;
+
+/// One comparison: what was rendered, on what, and how each mode came out.
+pub struct Report {
+    /// The GPU, or the software renderer, and its driver.
+    pub adapter: String,
+    /// Width and height of the pictures, in pixels.
+    pub size: [u32; 2],
+    /// The model's file, or what the embedded one is called.
+    pub model: String,
+    /// Whom the model's licence asks to name.
+    pub attribution: Option<String>,
+    /// The camera, such as `front`.
+    pub view: String,
+    /// Pixels that the figures are taken over.
+    pub skin_pixels: usize,
+    /// Width of a pixel on the skin, in millimetres.
+    pub mm_per_px: f64,
+    /// Width of a texel on the skin in the texture-space path, in millimetres.
+    pub mm_per_texel: f64,
+    /// Width and height of the texture-space path's atlas, in texels.
+    pub texture_size: u32,
+    /// The Gaussians that are too narrow for the atlas, one text each.
+    pub unresolved: Vec<String>,
+    /// Anything else that the reader should know, one sentence each.
+    pub notes: Vec<String>,
+    /// The command line that made this report.
+    pub command: String,
+    /// The modes that were rendered, in the order in which to show them.
+    pub modes: Vec<ModeReport>,
+    /// The modes that could not be: title and reason.
+    pub unavailable: Vec<(&'static str, String)>,
+}
+
+/// One mode: its cost, its distance from the texture-space path, its pictures.
+///
+/// A figure is `None` where it has no value: there is no texture-space path to compare with, or no
+/// skin in view.
+pub struct ModeReport {
+    /// The mode in `report.json`: `none`, `texture_space` or `screen_space`.
+    pub name: &'static str,
+    /// The mode for people.
+    pub title: &'static str,
+    /// Median wall time of the scattering alone, in milliseconds.
+    pub ms: f64,
+    /// The part of `ms` that draws the mesh into the atlas; texture space alone has one.
+    pub ms_raster: Option<f64>,
+    /// The part of `ms` that blurs the atlas; texture space alone has one.
+    pub ms_blur: Option<f64>,
+    /// Relative RMSE of the irradiance, a fraction.
+    pub rel_rmse: Option<f64>,
+    /// The same over the pixels where scattering changes the irradiance by more than .01.
+    pub rel_rmse_scattered: Option<f64>,
+    /// Largest error of any channel of the irradiance, in linear light.
+    pub max_error: Option<f64>,
+    /// CIEDE2000 difference of irradiance times albedo that 99 % of the pixels stay within.
+    pub delta_e2000_p99: Option<f64>,
+    /// Mean FLIP of the picture, 0 to 1.
+    pub flip_mean: Option<f64>,
+    /// Scattered over unscattered irradiance, both weighted by surface area and summed over skin.
+    pub energy_ratio: Option<f64>,
+    /// The finished picture, sRGB.
+    pub picture: RgbImage,
+    /// The irradiance as a picture, without albedo and highlights, sRGB.
+    pub diffuse: RgbImage,
+    /// The irradiance's difference from texture space, times [`DIFFERENCE_GAIN`].
+    pub difference: Option<RgbImage>,
+    /// FLIP of the picture against texture space, in the magma colours.
+    pub flip: Option<RgbImage>,
+}
+
+/// A row of the table and a key of `report.json`.
+struct Figure {
+    key: &'static str,
+    name: &'static str,
+    unit: &'static str,
+    meaning: &'static str,
+    /// Shown times this, with so many decimals.
+    scale: f64,
+    decimals: usize,
+    /// A part of the figure above it.
+    part: bool,
+    /// Left out of `report.json` where a mode has none, rather than null.
+    optional: bool,
+    value: fn(&ModeReport) -> Option<f64>,
+}
+
+const FIGURES: [Figure; 9] = [
+    Figure {
+        key: "ms",
+        name: "Time",
+        unit: "ms",
+        meaning: "Median wall time of the scattering alone, from submitting to done.",
+        scale: 1.0,
+        decimals: 2,
+        part: false,
+        optional: false,
+        value: |mode| Some(mode.ms),
+    },
+    Figure {
+        key: "ms_raster",
+        name: "of which raster",
+        unit: "ms",
+        meaning: "Drawing the mesh into the atlas.",
+        scale: 1.0,
+        decimals: 2,
+        part: true,
+        optional: true,
+        value: |mode| mode.ms_raster,
+    },
+    Figure {
+        key: "ms_blur",
+        name: "of which blur",
+        unit: "ms",
+        meaning: "Blurring the atlas, Gaussian by Gaussian.",
+        scale: 1.0,
+        decimals: 2,
+        part: true,
+        optional: true,
+        value: |mode| mode.ms_blur,
+    },
+    Figure {
+        key: "rel_rmse_vs_texture",
+        name: "Relative RMSE",
+        unit: "%",
+        meaning: "Distance of the irradiance from texture space, over skin but for its rim.",
+        scale: 100.0,
+        decimals: 2,
+        part: false,
+        optional: false,
+        value: |mode| mode.rel_rmse,
+    },
+    Figure {
+        key: "rel_rmse_scattered_vs_texture",
+        name: "where scattered",
+        unit: "%",
+        meaning: "The same over the pixels where scattering changes the irradiance by more than .01.",
+        scale: 100.0,
+        decimals: 2,
+        part: true,
+        optional: false,
+        value: |mode| mode.rel_rmse_scattered,
+    },
+    Figure {
+        key: "max_error_vs_texture",
+        name: "Largest error",
+        unit: "linear",
+        meaning: "Of any channel of the irradiance, on a linear scale where white is 1.",
+        scale: 1.0,
+        decimals: 4,
+        part: false,
+        optional: false,
+        value: |mode| mode.max_error,
+    },
+    Figure {
+        key: "delta_e2000_p99_vs_texture",
+        name: "Colour difference",
+        unit: "ΔE2000",
+        meaning: "99 % of the pixels are closer than this, before highlights. About 1 is just noticeable.",
+        scale: 1.0,
+        decimals: 2,
+        part: false,
+        optional: false,
+        value: |mode| mode.delta_e2000_p99,
+    },
+    Figure {
+        key: "flip_mean_vs_texture",
+        name: "Mean FLIP",
+        unit: "0 to 1",
+        meaning: "Visible difference of the finished pictures when one flips between them.",
+        scale: 1.0,
+        decimals: 4,
+        part: false,
+        optional: false,
+        value: |mode| mode.flip_mean,
+    },
+    Figure {
+        key: "energy_ratio",
+        name: "Energy",
+        unit: "ratio",
+        meaning: "Scattered over unscattered light, summed over the skin in view. \
+                  Skin that moved light without loss shows 1.",
+        scale: 1.0,
+        decimals: 4,
+        part: false,
+        optional: false,
+        value: |mode| mode.energy_ratio,
+    },
+];
+
+impl Figure {
+    fn value(&self, mode: &ModeReport) -> Option<f64> {
+        (self.value)(mode).filter(|value| value.is_finite())
+    }
+
+    fn text(&self, mode: &ModeReport) -> String {
+        let text = |value| format!("{:.*}", self.decimals, value * self.scale);
+        self.value(mode).map_or("–".into(), text)
+    }
+}
+
+/// One of the pictures that each mode comes with.
+struct View {
+    name: &'static str,
+    title: &'static str,
+    meaning: &'static str,
+    picture: fn(&ModeReport) -> Option<&RgbImage>,
+}
+
+const VIEWS: [View; 4] = [
+    View {
+        name: "picture",
+        title: "Picture",
+        meaning: "As it is shown, with highlights and tone mapping.",
+        picture: |mode| Some(&mode.picture),
+    },
+    View {
+        name: "diffuse",
+        title: "Diffuse light",
+        meaning: "The irradiance that scattering works on, without albedo and highlights.",
+        picture: |mode| Some(&mode.diffuse),
+    },
+    View {
+        name: "difference",
+        title: "Difference × 10",
+        meaning: "Irradiance against texture space, per channel: black is none, full is .1 or more.",
+        picture: |mode| mode.difference.as_ref(),
+    },
+    View {
+        name: "flip",
+        title: "FLIP",
+        meaning: "How visible the picture's difference from texture space is:",
+        picture: |mode| mode.flip.as_ref(),
+    },
+];
+
+/// `report.json`. A figure without a value is null.
+pub fn json(report: &Report) -> String {
+    let figures = |mode: &ModeReport| -> Map<String, Value> {
+        FIGURES
+            .iter()
+            .map(|figure| (figure, figure.value(mode)))
+            .filter(|(figure, value)| !figure.optional || value.is_some())
+            .map(|(figure, value)| (figure.key.to_string(), json!(value)))
+            .collect()
+    };
+    let modes: Map<String, Value> = report
+        .modes
+        .iter()
+        .map(|mode| (mode.name.to_string(), figures(mode).into()))
+        .collect();
+    let report = json!({
+        "adapter": report.adapter,
+        "size": report.size,
+        "model": report.model,
+        "attribution": report.attribution,
+        "view": report.view,
+        "command": report.command,
+        "skin_pixels": report.skin_pixels,
+        "mm_per_px": report.mm_per_px,
+        "mm_per_texel": report.mm_per_texel,
+        "texture_size": report.texture_size,
+        "unresolved": report.unresolved,
+        "flip_pixels_per_degree": PIXELS_PER_DEGREE,
+        "modes": modes,
+        "notes": notes(report),
+    });
+    format!("{report:#}\n")
+}
+
+/// The figures as plain text, a column for each mode, with what they were taken on.
+pub fn table(report: &Report) -> String {
+    let mut text = String::new();
+    let facts = facts(report);
+    let width = facts
+        .iter()
+        .map(|(name, _)| name.chars().count())
+        .max()
+        .unwrap_or(0);
+    for (name, fact) in facts {
+        line(&mut text, &format!("{name:<width$}  {fact}"));
+    }
+
+    let name_width = FIGURES
+        .iter()
+        .map(|f| indented(f).chars().count())
+        .max()
+        .unwrap_or(0);
+    let unit_width = FIGURES
+        .iter()
+        .map(|f| f.unit.chars().count())
+        .max()
+        .unwrap_or(0);
+    let row = |name: &str, unit: &str, cell: &dyn Fn(&ModeReport) -> String| {
+        let mut row = format!("{name:<name_width$}  {unit:<unit_width$}");
+        for mode in &report.modes {
+            let column = mode.title.chars().count().max(8);
+            row += &format!("  {:>column$}", cell(mode));
+        }
+        row
+    };
+    line(&mut text, "");
+    line(&mut text, &row("", "", &|mode| mode.title.into()));
+    for figure in shown(report) {
+        line(
+            &mut text,
+            &row(&indented(figure), figure.unit, &|mode| figure.text(mode)),
+        );
+    }
+
+    line(&mut text, "");
+    for note in headline(report).into_iter().chain(notes(report)) {
+        line(&mut text, &note);
+    }
+    text
+}
+
+/// `report.html`: one file that needs no other, neither beside it nor from the network. The
+/// fragment can set the slider, as in `report.html#left=none&right=screen_space&layer=flip&at=30`.
+///
+/// # Errors
+/// A picture that cannot be encoded as PNG.
+pub fn html(report: &Report) -> ImageResult<String> {
+    let title = escape(&report.model);
+    let mut page = format!(
+        "<!doctype html>\n<html lang=en>\n<meta charset=utf-8>\n\
+         <meta name=viewport content=\"width=device-width, initial-scale=1\">\n\
+         <title>{title}: skin with and without scattering</title>\n<style>{STYLE}</style>\n\
+         <main>\n<h1>Skin with and without scattering</h1>\n"
+    );
+    if let Some(headline) = headline(report) {
+        line(
+            &mut page,
+            &format!("<p class=lead>{}</p>", escape(&headline)),
+        );
+    }
+    for note in notes(report) {
+        line(&mut page, &format!("<p class=note>{}</p>", escape(&note)));
+    }
+    // A view that some mode lacks could not be compared.
+    let views: Vec<&View> = VIEWS
+        .iter()
+        .filter(|view| {
+            report
+                .modes
+                .iter()
+                .all(|mode| (view.picture)(mode).is_some())
+        })
+        .collect();
+    if report.modes.len() > 1 {
+        slider(&mut page, report, &views);
+    }
+    figures(&mut page, report);
+    pictures(&mut page, report, &views)?;
+    line(&mut page, "<h2>What was compared</h2>\n<dl>");
+    for (name, fact) in facts(report) {
+        line(
+            &mut page,
+            &format!("<dt>{name}</dt><dd>{}</dd>", escape(&fact)),
+        );
+    }
+    line(
+        &mut page,
+        &format!("</dl>\n</main>\n<script>{SCRIPT}</script>\n</html>"),
+    );
+    Ok(page)
+}
+
+/// The before/after slider. It holds no pictures: the script takes them from the page below.
+fn slider(page: &mut String, report: &Report, views: &[&View]) {
+    let select = |id: &str, label: &str, chosen: usize, options: &[(&str, &str)]| {
+        let mut select = format!("<label>{label} <select id={id} autocomplete=off>");
+        for (i, (name, title)) in options.iter().enumerate() {
+            let selected = if i == chosen { " selected" } else { "" };
+            select += &format!("<option value={name}{selected}>{}</option>", escape(title));
+        }
+        select + "</select></label>"
+    };
+    let modes: Vec<_> = report
+        .modes
+        .iter()
+        .map(|mode| (mode.name, mode.title))
+        .collect();
+    let layers: Vec<_> = views.iter().map(|view| (view.name, view.title)).collect();
+    let [width, height] = report.size;
+    let controls = [
+        select("left", "Left", 0, &modes),
+        select("layer", "Show", 0, &layers),
+        select("right", "Right", modes.len() - 1, &modes),
+    ];
+    line(
+        page,
+        &format!(
+            "<div class=controls>{}</div>\n\
+             <div class=mat><div id=frame style=\"--w:{width};--h:{height}\">\n\
+             <img id=right-picture alt draggable=false>\
+             <img id=left-picture alt draggable=false>\n\
+             <input id=at type=range min=0 max=100 value=50 autocomplete=off \
+             aria-label=\"Divider between the left and the right picture, in percent\">\n\
+             <i class=divider></i><b id=left-tag></b><b id=right-tag></b>\n</div></div>\n\
+             <noscript><p class=note>The slider needs JavaScript; all else does not.</p></noscript>",
+            controls.concat()
+        ),
+    );
+}
+
+/// The table of figures.
+fn figures(page: &mut String, report: &Report) {
+    line(page, "<h2>Numbers</h2>\n<table>\n<thead><tr><th></th>");
+    for mode in &report.modes {
+        line(page, &format!("<th scope=col>{}</th>", escape(mode.title)));
+    }
+    line(page, "</tr></thead>\n<tbody>");
+    for figure in shown(report) {
+        let part = if figure.part { " class=part" } else { "" };
+        let (name, unit, meaning) = (figure.name, figure.unit, figure.meaning);
+        line(
+            page,
+            &format!(
+                "<tr{part}><th scope=row>{name} <span>{unit}</span><small>{meaning}</small></th>"
+            ),
+        );
+        for mode in &report.modes {
+            line(page, &format!("<td>{}</td>", figure.text(mode)));
+        }
+        line(page, "</tr>");
+    }
+    line(page, "</tbody>\n</table>");
+}
+
+/// All pictures side by side: a strip for each view, each picture once in the file.
+fn pictures(page: &mut String, report: &Report, views: &[&View]) -> ImageResult<()> {
+    line(page, "<h2>Pictures</h2>");
+    for view in views {
+        let scale = if view.name == "flip" {
+            " 0 <i class=magma></i> 1"
+        } else {
+            ""
+        };
+        let (title, meaning) = (view.title, view.meaning);
+        line(
+            page,
+            &format!("<h3>{title}</h3>\n<p>{meaning}{scale}</p>\n<div class=\"mat strip\">"),
+        );
+        for mode in &report.modes {
+            let Some(picture) = (view.picture)(mode) else {
+                continue;
+            };
+            let (id, caption) = (mode.name, escape(mode.title));
+            let data = BASE64.encode(png(picture)?);
+            line(
+                page,
+                &format!(
+                    "<figure><img data-mode={id} data-layer={} alt=\"{title}: {caption}\" \
+                     src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption></figure>",
+                    view.name
+                ),
+            );
+        }
+        line(page, "</div>");
+    }
+    Ok(())
+}
+
+/// The figures for people: all but the optional ones that no mode has.
+fn shown(report: &Report) -> impl Iterator<Item = &'static Figure> {
+    FIGURES.iter().filter(|figure| {
+        !figure.optional || report.modes.iter().any(|mode| figure.value(mode).is_some())
+    })
+}
+
+/// The result in one sentence, where there is one.
+fn headline(report: &Report) -> Option<String> {
+    let error = |name| report.modes.iter().find(|mode| mode.name == name)?.rel_rmse;
+    let (screen, none) = (error("screen_space")?, error("none")?);
+    Some(format!(
+        "Over skin, screen space differs from texture space by {:.2} % (relative RMSE of the \
+         irradiance). Without scattering it is {:.2} %: the screen-space error is {:.2} times that.",
+        100.0 * screen,
+        100.0 * none,
+        screen / none,
+    ))
+}
+
+/// The modes that are missing, then the notes.
+fn notes(report: &Report) -> Vec<String> {
+    let missing = report
+        .unavailable
+        .iter()
+        .map(|(mode, reason)| format!("No {mode}: {reason}"));
+    missing.chain(report.notes.iter().cloned()).collect()
+}
+
+/// What was rendered and on what, as names and texts.
+fn facts(report: &Report) -> Vec<(&'static str, String)> {
+    let [width, height] = report.size;
+    let mut facts = vec![("Model", report.model.clone())];
+    facts.extend(
+        report
+            .attribution
+            .iter()
+            .map(|names| ("Attribution", names.clone())),
+    );
+    facts.push(("View", report.view.clone()));
+    facts.push((
+        "Picture",
+        format!(
+            "{width} × {height} px, {:.3} mm per px, {} px of skin",
+            report.mm_per_px, report.skin_pixels
+        ),
+    ));
+    let atlas = report.texture_size;
+    facts.push((
+        "Atlas",
+        format!(
+            "{atlas} × {atlas} texels, {:.3} mm per texel",
+            report.mm_per_texel
+        ),
+    ));
+    facts.extend(
+        report
+            .unresolved
+            .iter()
+            .map(|gaussian| ("Unresolved", gaussian.clone())),
+    );
+    facts.push((
+        "FLIP",
+        format!("at {PIXELS_PER_DEGREE} pixels per degree of visual angle"),
+    ));
+    facts.push(("Adapter", report.adapter.clone()));
+    facts.push(("Command", report.command.clone()));
+    facts
+}
+
+fn indented(figure: &Figure) -> String {
+    format!("{}{}", if figure.part { "  " } else { "" }, figure.name)
+}
+
+/// Adds a line without trailing blanks.
+fn line(text: &mut String, line: &str) {
+    text.push_str(line.trim_end());
+    text.push('\n');
+}
+
+/// Text as HTML shows it, between tags or in a quoted attribute.
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+        .replace('\'', "&#39;")
+}
+
+/// An sRGB picture as a PNG file.
+///
+/// # Errors
+/// A picture without pixels.
+pub fn png(picture: &RgbImage) -> ImageResult<Vec<u8>> {
+    let mut file = Vec::new();
+    // The encoder's default is made for speed; the report carries a dozen of these.
+    let encoder =
+        PngEncoder::new_with_quality(&mut file, CompressionType::Default, FilterType::Adaptive);
+    picture.write_with_encoder(encoder)?;
+    Ok(file)
+}
+
+/// A linear layer as an OpenEXR file, RGB in 32-bit floats.
+///
+/// # Errors
+/// A layer without pixels, or with another number of them than its size says.
+pub fn exr(layer: &Layer) -> ImageResult<Vec<u8>> {
+    let floats = layer.pixels.as_flattened().to_vec();
+    let mismatch = || {
+        ImageError::Parameter(ParameterError::from_kind(
+            ParameterErrorKind::DimensionMismatch,
+        ))
+    };
+    let image = Rgb32FImage::from_raw(layer.width, layer.height, floats).ok_or_else(mismatch)?;
+    let mut file = Cursor::new(Vec::new());
+    image.write_to(&mut file, ImageFormat::OpenExr)?;
+    Ok(file.into_inner())
+}
+
+/// Writes named files into the directory `out`, all or none: they are moved into place only when
+/// every one is on disk, in the order given. Makes `out` where it is missing, replaces files of
+/// the same names and leaves others alone.
+///
+/// # Errors
+/// Whatever keeps a file from being written, with the path that it happened to.
+pub fn write(out: &Path, files: &[(String, Vec<u8>)]) -> io::Result<()> {
+    let is_new = !out.exists();
+    // Inside `out`, not beside it: a move within one directory never crosses file systems, and
+    // the directory above may not be ours to write to.
+    let staging = out.join(format!(".compare-{}", process::id()));
+    let result = stage(&staging, out, files);
+    // What is left here is of no use to anyone, and the first error says what went wrong.
+    let _ = fs::remove_dir_all(&staging);
+    if is_new && result.is_err() {
+        let _ = fs::remove_dir(out);
+    }
+    result
+}
+
+fn stage(staging: &Path, out: &Path, files: &[(String, Vec<u8>)]) -> io::Result<()> {
+    let at = |path: &Path, error: io::Error| {
+        io::Error::new(error.kind(), format!("{}: {error}", path.display()))
+    };
+    // An interrupted run may have left one behind under the same process id.
+    let _ = fs::remove_dir_all(staging);
+    if out.exists() && !out.is_dir() {
+        return Err(at(out, io::ErrorKind::NotADirectory.into()));
+    }
+    fs::create_dir_all(out).map_err(|error| at(out, error))?;
+    fs::create_dir(staging).map_err(|error| at(staging, error))?;
+    for (name, bytes) in files {
+        let target = out.join(name);
+        if target.is_dir() {
+            return Err(at(&target, io::ErrorKind::IsADirectory.into()));
+        }
+        fs::write(staging.join(name), bytes).map_err(|error| at(&target, error))?;
+    }
+    for (name, _) in files {
+        let target = out.join(name);
+        fs::rename(staging.join(name), &target).map_err(|error| at(&target, error))?;
+    }
+    Ok(())
+}
+
+// Pictures lie on 18 % grey (sRGB 118), so that neither their colours nor their brightness are
+// judged against the page.
+const STYLE: &str = "
+:root { color-scheme: dark; --page: #262626; --text: #e4e4e4; --dim: #a8a8a8; --rule: #444; }
+* { box-sizing: border-box; }
+body { margin: 0; background: var(--page); color: var(--text); font: 16px/1.5 system-ui, sans-serif; }
+main { max-width: 68rem; margin: auto; padding: clamp(1rem, 4vw, 2.5rem); }
+h1 { margin: 0 0 .5rem; font-size: clamp(1.5rem, 4vw, 2.2rem); font-weight: 600; line-height: 1.2; }
+h2 { margin: 3rem 0 .75rem; font-size: 1.3rem; font-weight: 600; }
+h3 { margin: 1.5rem 0 0; font-size: 1rem; font-weight: 600; }
+h3 + p { margin: 0 0 .5rem; color: var(--dim); font-size: .9rem; }
+.lead { margin: 0 0 1.5rem; max-width: 46rem; }
+.note { margin: 0 0 1.5rem; padding-left: .75rem; border-left: 3px solid #c9a24a; color: var(--dim); }
+.controls { display: flex; flex-wrap: wrap; justify-content: space-between; gap: .5rem 1rem; margin-bottom: .75rem; }
+.controls label { color: var(--dim); font-size: .9rem; }
+select { font: inherit; color: var(--text); background: #3a3a3a; border: 1px solid #5a5a5a; border-radius: 4px; padding: .3rem .4rem; }
+.mat { background: #767676; padding: clamp(.5rem, 2.5vw, 1.75rem); border-radius: 4px; }
+img { display: block; width: 100%; image-rendering: auto; }
+#frame { --at: 50%; position: relative; overflow: hidden; margin: auto; aspect-ratio: var(--w) / var(--h);
+  width: min(100%, 84vh * var(--w) / var(--h), max(1px * var(--w), 48rem));
+  cursor: ew-resize; user-select: none; -webkit-user-select: none; touch-action: pan-y; }
+#frame > * { position: absolute; pointer-events: none; }
+#frame img { inset: 0; height: 100%; }
+#left-picture { clip-path: inset(0 calc(100% - var(--at)) 0 0); }
+#at { opacity: 0; inset: 0; width: 100%; margin: 0; }
+.divider { top: 0; bottom: 0; left: calc(var(--at) - 1px); width: 2px; background: #fff; box-shadow: 0 0 4px #000a; }
+.divider::after { content: '\\2039\\2009\\203a'; position: absolute; top: 50%; left: 50%; width: 2.2rem; height: 2.2rem;
+  transform: translate(-50%, -50%); border-radius: 50%; background: #fff; color: #222; box-shadow: 0 1px 5px #0009;
+  font: 600 1.3rem/2.1rem system-ui, sans-serif; text-align: center; }
+#at:focus-visible ~ .divider::after { outline: 3px solid #6ab0ff; outline-offset: 2px; }
+#frame b { bottom: .6rem; padding: .15rem .55rem; border-radius: 3px; background: #000b; color: #fff; font-size: .85rem; font-weight: 500; }
+#left-tag { left: .6rem; }
+#right-tag { right: .6rem; }
+table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
+th, td { padding: .45rem 0 .45rem clamp(.5rem, 3vw, 2rem); border-bottom: 1px solid var(--rule); vertical-align: top; text-align: right; font-weight: 400; }
+thead th { vertical-align: bottom; font-weight: 600; font-size: .9rem; line-height: 1.25; }
+th[scope=row] { padding-left: 0; text-align: left; }
+th span { color: var(--dim); font-size: .85rem; }
+th small { display: block; max-width: 34rem; color: var(--dim); font-size: .8rem; line-height: 1.35; }
+.part th[scope=row] { padding-left: 1.25rem; }
+.strip { display: flex; gap: clamp(.4rem, 1.5vw, 1rem); padding-bottom: .6rem; }
+figure { flex: 1 1 0; min-width: 0; margin: 0; }
+figcaption { margin-top: .3rem; color: #fff; font-size: .85rem; line-height: 1.25; text-align: center; }
+.magma { display: inline-block; width: 6rem; height: .8em; vertical-align: -.05em; border-radius: 2px;
+  background: linear-gradient(90deg, #000004, #3b0f70, #8c2981, #de4968, #fe9f6d, #fcfdbf); }
+dl { display: grid; grid-template-columns: max-content 1fr; gap: .2rem 1.25rem; margin: 0; font-size: .9rem; }
+dt { color: var(--dim); }
+dd { margin: 0; overflow-wrap: anywhere; }
+@media (max-width: 34rem) { body { font-size: 15px; } td, thead th { font-size: .8rem; } .part th[scope=row] { padding-left: .6rem; } }
+";
+
+// The range input is the divider for the keyboard and for screen readers, whole percents; the
+// pointer drags anywhere on the picture, to the pixel.
+const SCRIPT: &str = "
+'use strict';
+const $ = id => document.getElementById(id);
+const frame = $('frame'), at = $('at');
+function move(percent) {
+  at.value = percent;
+  frame.style.setProperty('--at', Math.min(100, Math.max(0, percent)) + '%');
+}
+function show() {
+  for (const side of ['left', 'right']) {
+    const mode = $(side).selectedOptions[0];
+    const picture = document.querySelector(`[data-mode=${mode.value}][data-layer=${$('layer').value}]`);
+    $(side + '-picture').src = picture.src;
+    $(side + '-picture').alt = picture.alt;
+    $(side + '-tag').textContent = mode.text;
+  }
+}
+function drag(event) {
+  const box = frame.getBoundingClientRect();
+  move(100 * (event.clientX - box.left) / box.width);
+}
+if (frame) {
+  frame.addEventListener('pointerdown', event => {
+    if (event.button !== 0) return;
+    event.preventDefault();
+    frame.setPointerCapture(event.pointerId);
+    at.focus({ preventScroll: true, focusVisible: false });
+    drag(event);
+  });
+  frame.addEventListener('pointermove', event => {
+    if (frame.hasPointerCapture(event.pointerId)) drag(event);
+  });
+  at.addEventListener('input', () => move(+at.value));
+  for (const [id, value] of new URLSearchParams(location.hash.slice(1))) {
+    if (id === 'at') at.value = value;
+    const select = ['left', 'right', 'layer'].includes(id) ? $(id) : null;
+    if (select && [...select.options].some(option => option.value === value)) select.value = value;
+  }
+  for (const id of ['left', 'right', 'layer']) $(id).addEventListener('change', show);
+  show();
+  move(+at.value);
+}
+";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mode(name: &'static str, title: &'static str, shade: u8, error: Option<f64>) -> ModeReport {
+        let picture = RgbImage::from_pixel(3, 2, image::Rgb([shade, 80, 60]));
+        let is_texture = name == "texture_space";
+        ModeReport {
+            name,
+            title,
+            ms: 12.5,
+            ms_raster: is_texture.then_some(2.5),
+            ms_blur: is_texture.then_some(10.0),
+            rel_rmse: error,
+            rel_rmse_scattered: error,
+            max_error: error,
+            delta_e2000_p99: error,
+            flip_mean: error,
+            energy_ratio: Some(1.0),
+            diffuse: picture.clone(),
+            difference: error.map(|_| picture.clone()),
+            flip: error.map(|_| picture.clone()),
+            picture,
+        }
+    }
+
+    fn report() -> Report {
+        Report {
+            adapter: "llvmpipe".into(),
+            size: [3, 2],
+            model: "<script>alert('head')</script>".into(),
+            attribution: Some("Name & Co".into()),
+            view: "front".into(),
+            skin_pixels: 5,
+            mm_per_px: 0.5,
+            mm_per_texel: 0.25,
+            texture_size: 2048,
+            unresolved: vec!["variance .0064 mm²".into()],
+            notes: vec!["a < b".into()],
+            command: "compare --model \"<x>\"".into(),
+            modes: vec![
+                mode("none", "No scattering", 10, Some(0.08)),
+                mode("texture_space", "Texture space", 20, Some(0.0)),
+                mode("screen_space", "Screen space", 30, Some(0.02)),
+            ],
+            unavailable: vec![],
+        }
+    }
+
+    /// A mesh without UVs: no texture space, and nothing to compare with.
+    fn without_texture_space() -> Report {
+        Report {
+            modes: vec![
+                mode("none", "No scattering", 10, None),
+                mode("screen_space", "Screen space", 30, None),
+            ],
+            unavailable: vec![("Texture space", "the mesh has no UVs.".into())],
+            ..report()
+        }
+    }
+
+    #[test]
+    fn json_has_the_promised_keys() {
+        let json: Value = serde_json::from_str(&json(&report())).unwrap();
+        assert_eq!(json["adapter"], "llvmpipe");
+        assert_eq!(json["size"], json!([3, 2]));
+        assert_eq!(json["model"], "<script>alert('head')</script>");
+        assert_eq!(json["skin_pixels"], 5);
+        assert_eq!(json["flip_pixels_per_degree"], 67.0);
+        for name in ["none", "texture_space", "screen_space"] {
+            let mode = json["modes"][name].as_object().unwrap();
+            for figure in FIGURES.iter().filter(|figure| !figure.optional) {
+                assert!(mode[figure.key].is_number(), "{name} {}", figure.key);
+            }
+            for part in ["ms_raster", "ms_blur"] {
+                assert_eq!(
+                    mode.contains_key(part),
+                    name == "texture_space",
+                    "{name} {part}"
+                );
+            }
+        }
+        assert_eq!(json["modes"]["screen_space"]["rel_rmse_vs_texture"], 0.02);
+    }
+
+    #[test]
+    fn figures_without_a_value_are_null() {
+        let mut report = without_texture_space();
+        report.modes[1].energy_ratio = Some(f64::NAN);
+        let json: Value = serde_json::from_str(&json(&report)).unwrap();
+        assert!(json["modes"].get("texture_space").is_none());
+        for key in [
+            "rel_rmse_vs_texture",
+            "flip_mean_vs_texture",
+            "energy_ratio",
+        ] {
+            assert!(json["modes"]["screen_space"][key].is_null(), "{key}");
+        }
+        assert_eq!(json["notes"][0], "No Texture space: the mesh has no UVs.");
+    }
+
+    #[test]
+    fn html_needs_no_other_file() {
+        let report = report();
+        let html = html(&report).unwrap();
+        assert!(!html.contains("http:") && !html.contains("https:") && !html.contains("url("));
+        for mode in &report.modes {
+            let data = BASE64.encode(png(&mode.picture).unwrap());
+            assert!(
+                html.contains(&format!("src=\"data:image/png;base64,{data}\"")),
+                "{}",
+                mode.name
+            );
+        }
+        // Every picture is there once: three modes, four views.
+        assert_eq!(html.matches("data:image/png").count(), 12);
+    }
+
+    #[test]
+    fn html_shows_text_from_outside_as_text() {
+        let html = html(&report()).unwrap();
+        assert!(html.contains("&lt;script&gt;alert(&#39;head&#39;)&lt;/script&gt;"));
+        assert!(html.contains("Name &amp; Co") && html.contains("a &lt; b"));
+        assert!(html.contains("&quot;&lt;x&gt;&quot;"));
+        assert!(!html.contains("<script>alert") && !html.contains("<x>"));
+    }
+
+    #[test]
+    fn html_without_texture_space_says_so_and_offers_no_difference() {
+        let html = html(&without_texture_space()).unwrap();
+        assert!(html.contains("No Texture space: the mesh has no UVs."));
+        assert!(!html.contains("data-layer=flip") && !html.contains("value=flip"));
+        assert_eq!(html.matches("data:image/png").count(), 4);
+    }
+
+    #[test]
+    fn the_table_is_aligned() {
+        for report in [report(), without_texture_space()] {
+            let table = table(&report);
+            let rows: Vec<&str> = table.lines().skip_while(|line| !line.is_empty()).collect();
+            let width = |row: &str| row.chars().count();
+            for row in &rows[1..=1 + shown(&report).count()] {
+                assert_eq!(width(row), width(rows[1]), "{row}");
+            }
+        }
+    }
+
+    #[test]
+    fn layers_survive_their_files() {
+        let layer = Layer {
+            width: 2,
+            height: 1,
+            pixels: vec![[0.1, 2.5, -0.3], [1e-6, 0.0, 4.0]],
+        };
+        let read = image::load_from_memory(&exr(&layer).unwrap())
+            .unwrap()
+            .into_rgb32f();
+        assert_eq!(read.as_raw(), layer.pixels.as_flattened());
+        assert!(exr(&Layer { width: 3, ..layer }).is_err());
+
+        let picture = RgbImage::from_fn(5, 4, |x, y| image::Rgb([x as u8, y as u8, 200]));
+        let read = image::load_from_memory(&png(&picture).unwrap())
+            .unwrap()
+            .into_rgb8();
+        assert_eq!(read, picture);
+    }
+
+    /// A directory of this test's own, removed when the test ends, also by a failure.
+    struct Scratch(std::path::PathBuf);
+
+    impl Scratch {
+        fn new(name: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("compare-{name}-{}", process::id()));
+            fs::create_dir_all(&path).unwrap();
+            Self(path)
+        }
+
+        fn names(&self) -> Vec<String> {
+            let entries = fs::read_dir(&self.0).unwrap();
+            let mut names: Vec<_> = entries
+                .map(|e| e.unwrap().file_name().into_string().unwrap())
+                .collect();
+            names.sort();
+            names
+        }
+    }
+
+    impl Drop for Scratch {
+        fn drop(&mut self) {
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    fn files(names: &[&str]) -> Vec<(String, Vec<u8>)> {
+        names
+            .iter()
+            .map(|&name| (name.to_string(), b"new".to_vec()))
+            .collect()
+    }
+
+    #[test]
+    fn write_replaces_its_own_files_and_no_others() {
+        let dir = Scratch::new("replace");
+        fs::write(dir.0.join("a"), "old").unwrap();
+        fs::write(dir.0.join("other"), "old").unwrap();
+        write(&dir.0, &files(&["a", "b"])).unwrap();
+        assert_eq!(dir.names(), ["a", "b", "other"]);
+        assert_eq!(fs::read(dir.0.join("a")).unwrap(), b"new");
+        assert_eq!(fs::read(dir.0.join("other")).unwrap(), b"old");
+
+        write(&dir.0.join("deep/er"), &files(&["a"])).unwrap();
+        assert_eq!(fs::read(dir.0.join("deep/er/a")).unwrap(), b"new");
+    }
+
+    #[test]
+    fn a_failed_write_leaves_nothing() {
+        let dir = Scratch::new("fail");
+        // The directory to write to is a file.
+        fs::write(dir.0.join("out"), "mine").unwrap();
+        let error = write(&dir.0.join("out"), &files(&["a"])).unwrap_err();
+        assert!(error.to_string().contains("out"), "{error}");
+        assert_eq!(dir.names(), ["out"]);
+        assert_eq!(fs::read(dir.0.join("out")).unwrap(), b"mine");
+
+        // One of the files cannot be replaced.
+        fs::create_dir(dir.0.join("b")).unwrap();
+        write(&dir.0, &files(&["a", "b"])).unwrap_err();
+        assert_eq!(dir.names(), ["b", "out"]);
+
+        // One of the files cannot be written, in a directory that was not there before.
+        write(&dir.0.join("new"), &files(&["a", "no/such"])).unwrap_err();
+        assert_eq!(dir.names(), ["b", "out"]);
+    }
+}

@@ -1,0 +1,318 @@
+// The sum of Gaussians over a surface that is given by a position per pixel: the pixels of a frame
+// (screen space) or the texels of an atlas (texture space).
+//
+//   L(p) = Σᵢ wᵢ · Σ_q E(q) A(q) exp(−|q−p|²/2vᵢ) / Σ_q A(q) exp(−|q−p|²/2vᵢ)
+//
+// [LS15] Li & Shao 2015, "GPU-based face rendering via the physical model of light interaction
+//        with human skin", Eq. 7–12. Their Eq. 10 lacks 1/v; the division above makes up for it.
+// [EL07] d'Eon & Luebke 2007, "Advanced techniques for realistic real-time skin rendering".
+// docs/method.md tells where this departs from both, and why.
+
+struct Settings {
+    // Weights of red, green and blue, and the variance in mm²: Gaussian i of profile id is at
+    // 8·(id − 1) + i.
+    gaussians: array<vec4f, 128>,
+    // The least mm between neighbouring pixels at view depth z: x + y·z along a row, z + w·z along
+    // a column. Zero: as far as the surface itself says.
+    spacing: vec4f,
+    mm_per_unit: f32,
+    // Pixels to which the result is carried past the edge of the surface.
+    gutter: i32,
+    pad: vec2u,
+}
+
+@group(0) @binding(0) var<uniform> settings: Settings;
+// Position in scene units, and profile id (0: no surface).
+@group(0) @binding(1) var positions: texture_2d<f32>;
+@group(0) @binding(2) var irradiance: texture_2d<f32>;
+// E·A and A, the pixel's irradiance times its area in mm², and that area.
+@group(0) @binding(3) var source: texture_2d<f32>;
+// Σ w·A·E and Σ w·A along a row, unnormalised.
+@group(0) @binding(4) var rows: texture_2d<f32>;
+// The Gaussians summed so far.
+@group(0) @binding(5) var sum: texture_2d<f32>;
+
+// Beyond 3.5 σ a Gaussian on a plane holds e^(−3.5²/2) = .2 % of its mass.
+const REACH_SIGMAS = 3.5;
+// Up to this reach in pixels a kernel is summed over its square: there a row of taps is too coarse
+// to be sheared, and the square is cheap.
+const SQUARE_REACH = 2;
+// Variance along a row, in px², from which the nearest pixel stands for a sheared tap.
+const WIDE_PX2 = 9.0;
+
+struct Vertex {
+    @builtin(position) position: vec4f,
+    @location(0) @interpolate(flat) gaussian: u32,
+}
+
+// One triangle over the whole target; the instance is the Gaussian.
+@vertex
+fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) gaussian: u32) -> Vertex {
+    let uv = vec2f(f32((vertex << 1u) & 2u), f32(vertex & 2u));
+    return Vertex(vec4f(uv * 2.0 - 1.0, 0.0, 1.0), gaussian);
+}
+
+struct Point {
+    mm: vec3f,
+    profile: u32,
+}
+
+fn size() -> vec2i {
+    return vec2i(textureDimensions(positions));
+}
+
+fn point(pixel: vec2i) -> Point {
+    let texel = textureLoad(positions, pixel, 0);
+    return Point(texel.xyz * settings.mm_per_unit, u32(texel.w));
+}
+
+fn point_or_none(pixel: vec2i) -> Point {
+    if any(pixel < vec2i(0)) || any(pixel >= size()) {
+        return Point(vec3f(0.0), 0u);
+    }
+    return point(pixel);
+}
+
+// ∂p/∂x of the surface through `here` for a step of one pixel, in mm: the mean of both sides where
+// they agree, the shorter where one of them jumps to another layer, zero where there is none.
+fn tangent(pixel: vec2i, step: vec2i, here: Point) -> vec3f {
+    let next = point_or_none(pixel + step);
+    let last = point_or_none(pixel - step);
+    let forward = next.mm - here.mm;
+    let backward = here.mm - last.mm;
+    let has_forward = next.profile == here.profile;
+    let has_backward = last.profile == here.profile;
+    if has_forward && has_backward {
+        let f = dot(forward, forward);
+        let b = dot(backward, backward);
+        // A factor of two in length is more than a smooth surface changes in a pixel.
+        if max(f, b) <= 4.0 * min(f, b) {
+            return 0.5 * (forward + backward);
+        }
+        return select(backward, forward, f < b);
+    }
+    if has_forward {
+        return forward;
+    }
+    return select(vec3f(0.0), backward, has_backward);
+}
+
+// The pixel's frame on the surface: M = JᵀJ with J = (∂p/∂x ∂p/∂y), as area √det M in mm², the
+// shear κ = M₀₁/M₀₀, M₀₀, and the mm between pixels along a row and between sheared rows.
+struct Metric {
+    area: f32,
+    shear: f32,
+    m00: f32,
+    spacing: vec2f,
+}
+
+fn metric(pixel: vec2i, here: Point) -> Metric {
+    let tx = tangent(pixel, vec2i(1, 0), here);
+    let ty = tangent(pixel, vec2i(0, 1), here);
+    var xx = dot(tx, tx);
+    var yy = dot(ty, ty);
+    let xy = dot(tx, ty);
+    // A strip one pixel wide has no width of its own: it is taken to be as wide as a pixel is long.
+    if xx == 0.0 {
+        xx = yy;
+    }
+    if yy == 0.0 {
+        yy = xx;
+    }
+    if xx == 0.0 {
+        return Metric(1.0, 0.0, 0.0, vec2f(1.0));
+    }
+    let area = sqrt(max(xx * yy - xy * xy, 0.0));
+    var spacing = vec2f(sqrt(xx), area / sqrt(xx));
+    if settings.spacing.x + abs(settings.spacing.y) > 0.0 {
+        spacing = abs(settings.spacing.xz + settings.spacing.yw * here.mm.z);
+    }
+    return Metric(area, xy / xx, xx, spacing);
+}
+
+// Weights, and the variance that point weights need for a spread of v on a lattice of this spacing.
+//
+// Point weights of a Gaussian under ~ .6 px spread less than it does: with w = e^(−1/2s) at the
+// next pixel, (2w + 8w⁴)/(1 + 2w + 2w⁴) px² instead of s px². Solved for w.
+fn gaussian(here: Point, i: u32, spacing: vec2f) -> vec4f {
+    let g = settings.gaussians[8u * (here.profile - 1u) + i];
+    let px2 = max(spacing.x * spacing.y, 1e-20);
+    let s = g.w / px2;
+    if s > 0.4 || s < 1e-6 {
+        return g;
+    }
+    var w = 0.5 * s / (1.0 - s);
+    for (var step = 0; step < 6; step++) {
+        let w4 = w * w * w * w;
+        w = 0.5 * (s - (8.0 - 2.0 * s) * w4) / (1.0 - s);
+    }
+    return vec4f(g.rgb, -0.5 * px2 / log(w));
+}
+
+// Pixels that the Gaussian reaches along a row and over the rows.
+fn reach(spacing: vec2f, variance_mm2: f32) -> vec2i {
+    let pixels = ceil(REACH_SIGMAS * sqrt(variance_mm2) / max(spacing, vec2f(1e-20)));
+    return vec2i(min(pixels, vec2f(size())));
+}
+
+// exp(−d²/2v); a variance of nothing weighs the pixel itself alone.
+fn weight(distance2_mm2: f32, variance_mm2: f32) -> f32 {
+    return exp(-0.5 * distance2_mm2 / max(variance_mm2, 1e-12));
+}
+
+fn distance2(a: vec3f, b: vec3f) -> f32 {
+    let d = a - b;
+    return dot(d, d);
+}
+
+// E·A and A.
+@fragment
+fn fs_source(vertex: Vertex) -> @location(0) vec4f {
+    let pixel = vec2i(vertex.position.xy);
+    let here = point(pixel);
+    if here.profile == 0u {
+        return vec4f(0.0);
+    }
+    let area = metric(pixel, here).area;
+    return vec4f(textureLoad(irradiance, pixel, 0).rgb * area, area);
+}
+
+// First pass: along the row, unnormalised, so that the area enters once.
+@fragment
+fn fs_rows(vertex: Vertex) -> @location(0) vec4f {
+    let pixel = vec2i(vertex.position.xy);
+    let here = point(pixel);
+    if here.profile == 0u {
+        return vec4f(0.0);
+    }
+    let spacing = metric(pixel, here).spacing;
+    let variance_mm2 = gaussian(here, vertex.gaussian, spacing).w;
+    let reach = reach(spacing, variance_mm2);
+    if all(reach <= vec2i(SQUARE_REACH)) {
+        return vec4f(0.0);
+    }
+    let first = max(pixel.x - reach.x, 0);
+    let last = min(pixel.x + reach.x, size().x - 1);
+    var total = vec4f(0.0);
+    for (var x = first; x <= last; x++) {
+        let q = vec2i(x, pixel.y);
+        let there = point(q);
+        if there.profile == here.profile {
+            let w = weight(distance2(there.mm, here.mm), variance_mm2);
+            total += w * textureLoad(source, q, 0);
+        }
+    }
+    return total;
+}
+
+// A small kernel, over its square.
+fn square(pixel: vec2i, here: Point, reach: vec2i, variance_mm2: f32) -> vec4f {
+    let first = max(pixel - reach, vec2i(0));
+    let last = min(pixel + reach, size() - 1);
+    var total = vec4f(0.0);
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            let there = point(vec2i(x, y));
+            if there.profile == here.profile {
+                let w = weight(distance2(there.mm, here.mm), variance_mm2);
+                total += w * textureLoad(source, vec2i(x, y), 0);
+            }
+        }
+    }
+    return total;
+}
+
+// A row's sum as `here` weighs it, δ = `delta` pixels along the row from where it is wanted: by
+// the distance without its part M₀₀δ², which the first pass has spent. Zero off the surface.
+fn row_at(q: vec2i, delta: f32, here: Point, m: Metric, variance_mm2: f32) -> vec4f {
+    if q.x < 0 || q.x >= size().x {
+        return vec4f(0.0);
+    }
+    let there = point(q);
+    if there.profile != here.profile {
+        return vec4f(0.0);
+    }
+    let d2 = max(distance2(there.mm, here.mm) - m.m00 * delta * delta, 0.0);
+    return weight(d2, variance_mm2) * textureLoad(rows, q, 0);
+}
+
+// Second pass: over the rows along the sheared step (−κ, 1), which completes the square
+// M₀₀(dx + κ dy)² + (M₁₁ − κ²M₀₀)dy². Sheared taps fall between two pixels.
+fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, variance_mm2: f32) -> vec4f {
+    let first = max(pixel.y - reach.y, 0);
+    let last = min(pixel.y + reach.y, size().y - 1);
+    var total = vec4f(0.0);
+    if variance_mm2 > WIDE_PX2 * m.m00 {
+        // The nearer pixel will do: it rounds alike on both sides, so that it shifts nothing.
+        for (var y = first; y <= last; y++) {
+            let dx = -m.shear * f32(y - pixel.y);
+            let nearest = sign(dx) * floor(abs(dx) + 0.5);
+            let q = vec2i(pixel.x + i32(nearest), y);
+            total += row_at(q, nearest - dx, here, m, variance_mm2);
+        }
+        return total;
+    }
+    for (var y = first; y <= last; y++) {
+        let dx = -m.shear * f32(y - pixel.y);
+        let q = vec2i(pixel.x + i32(floor(dx)), y);
+        let f = fract(dx);
+        let left = row_at(q, -f, here, m, variance_mm2);
+        let right = row_at(q + vec2i(1, 0), 1.0 - f, here, m, variance_mm2);
+        let share = vec2f(1.0 - f, f) * step(vec2f(1e-30), vec2f(left.a, right.a));
+        if share.x + share.y > 0.0 {
+            total += (share.x * left + share.y * right) / (share.x + share.y);
+        }
+    }
+    return total;
+}
+
+@fragment
+fn fs_sum(vertex: Vertex) -> @location(0) vec4f {
+    let pixel = vec2i(vertex.position.xy);
+    let here = point(pixel);
+    if here.profile == 0u {
+        return vec4f(0.0);
+    }
+    var before = vec3f(0.0);
+    if vertex.gaussian > 0u {
+        before = textureLoad(sum, pixel, 0).rgb;
+    }
+    let m = metric(pixel, here);
+    let g = gaussian(here, vertex.gaussian, m.spacing);
+    if all(g.rgb == vec3f(0.0)) {
+        return vec4f(before, 1.0);
+    }
+    let reach = reach(m.spacing, g.w);
+    var total: vec4f;
+    if all(reach <= vec2i(SQUARE_REACH)) {
+        total = square(pixel, here, reach, g.w);
+    } else {
+        total = sheared_rows(pixel, here, m, reach, g.w);
+    }
+    return vec4f(before + g.rgb * total.rgb / total.a, 1.0);
+}
+
+// The result: the sum on the surface, carried into the gutter, and the input as it was elsewhere.
+@fragment
+fn fs_resolve(vertex: Vertex) -> @location(0) vec4f {
+    let pixel = vec2i(vertex.position.xy);
+    let before = textureLoad(irradiance, pixel, 0);
+    if point(pixel).profile != 0u {
+        return vec4f(textureLoad(sum, pixel, 0).rgb, before.a);
+    }
+    for (var ring = 1; ring <= settings.gutter; ring++) {
+        var total = vec4f(0.0);
+        for (var y = -ring; y <= ring; y++) {
+            for (var x = -ring; x <= ring; x++) {
+                let q = pixel + vec2i(x, y);
+                if max(abs(x), abs(y)) == ring && point_or_none(q).profile != 0u {
+                    total += vec4f(textureLoad(sum, q, 0).rgb, 1.0);
+                }
+            }
+        }
+        if total.a > 0.0 {
+            return vec4f(total.rgb / total.a, before.a);
+        }
+    }
+    return before;
+}

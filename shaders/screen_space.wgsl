@@ -1,0 +1,38 @@
+// View-space positions from a host's depth buffer: what turns a frame into a surface.
+// Any projection is undone by its inverse: perspective or orthographic, forward, reversed or
+// infinite depth, off-centre.
+
+struct Settings {
+    // Normalised device coordinates to view space, in mm.
+    inverse_projection: mat4x4f,
+    profiles: u32,
+    pad: vec3u,
+}
+
+@group(0) @binding(0) var<uniform> settings: Settings;
+@group(0) @binding(1) var depth: texture_2d<f32>;
+@group(0) @binding(2) var profile_id: texture_2d<u32>;
+
+@vertex
+fn vs_main(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
+    let uv = vec2f(f32((vertex << 1u) & 2u), f32(vertex & 2u));
+    return vec4f(uv * 2.0 - 1.0, 0.0, 1.0);
+}
+
+// Position in mm, and the profile id; zero where nothing scatters.
+@fragment
+fn fs_positions(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    let pixel = vec2i(at.xy);
+    let id = textureLoad(profile_id, pixel, 0).r;
+    if id == 0u || id > settings.profiles {
+        return vec4f(0.0);
+    }
+    let uv = at.xy / vec2f(textureDimensions(depth));
+    let ndc = vec4f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, textureLoad(depth, pixel, 0).r, 1.0);
+    let p = settings.inverse_projection * ndc;
+    // Infinitely far away there is no surface.
+    if p.w == 0.0 {
+        return vec4f(0.0);
+    }
+    return vec4f(p.xyz / p.w, f32(id));
+}

@@ -1,0 +1,355 @@
+//! The sum of Gaussians over a surface given by a position per pixel: what the screen-space and
+//! the texture-space effect share. Driver of `shaders/gaussian_sum.wgsl`.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec4;
+use wgpu::{
+    BindGroup, BindGroupLayout, CommandEncoder, Device, Queue, RenderPipeline, TextureFormat,
+    TextureView,
+};
+
+use crate::{MAX_PROFILES, Profile};
+
+/// Per pixel: E·A and A, Σ over a row, and the running sum. Full floats: twelve roundings to half
+/// floats would lose energy.
+pub(crate) const SCRATCH: TextureFormat = TextureFormat::Rgba32Float;
+
+const POSITIONS: u32 = 1;
+const IRRADIANCE: u32 = 2;
+const SOURCE: u32 = 3;
+const ROWS: u32 = 4;
+const SUM: u32 = 5;
+
+/// `Settings` of the shader.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(crate) struct Settings {
+    pub gaussians: [Vec4; MAX_PROFILES * Profile::MAX_GAUSSIANS],
+    /// See the shader; zero where the surface itself tells.
+    pub spacing: Vec4,
+    pub mm_per_unit: f32,
+    /// Pixels.
+    pub gutter: i32,
+    pub pad: [u32; 2],
+}
+
+impl Settings {
+    pub fn new(profiles: &[Profile], mm_per_unit: f32) -> Self {
+        let mut settings = Self {
+            mm_per_unit,
+            ..Self::zeroed()
+        };
+        for (slots, profile) in settings
+            .gaussians
+            .chunks_exact_mut(Profile::MAX_GAUSSIANS)
+            .zip(profiles)
+        {
+            for (slot, g) in slots.iter_mut().zip(profile.gaussians()) {
+                *slot = g.weight.extend(g.variance_mm2);
+            }
+        }
+        settings
+    }
+}
+
+/// The passes, and what they need for the frame that was last prepared.
+pub(crate) struct GaussianSum {
+    label: &'static str,
+    settings: wgpu::Buffer,
+    source: Pass,
+    rows: Pass,
+    sum: Pass,
+    resolve: Pass,
+    scratch: Option<Scratch>,
+    frame: Option<Frame>,
+}
+
+struct Pass {
+    label: String,
+    /// Bindings of the textures that it reads.
+    textures: Vec<u32>,
+    layout: BindGroupLayout,
+    pipeline: RenderPipeline,
+}
+
+struct Scratch {
+    size: [u32; 2],
+    source: TextureView,
+    rows: TextureView,
+    sums: [TextureView; 2],
+}
+
+struct Frame {
+    gaussians: u32,
+    output: TextureView,
+    source: BindGroup,
+    rows: BindGroup,
+    /// Reads the one sum, writes the other.
+    sums: [BindGroup; 2],
+    resolve: BindGroup,
+}
+
+/// Views and numbers of one frame, already checked.
+pub(crate) struct Inputs<'a> {
+    pub positions: &'a TextureView,
+    pub irradiance: &'a TextureView,
+    pub output: &'a TextureView,
+    pub profiles: &'a [Profile],
+    pub settings: Settings,
+}
+
+impl GaussianSum {
+    pub fn new(device: &Device, output_format: TextureFormat, label: &'static str) -> Self {
+        let shader = device.create_shader_module(wgpu::include_wgsl!("../shaders/gaussian_sum.wgsl"));
+        let pass = |name: &str, textures: &[u32], format| {
+            Pass::new(device, &shader, &format!("{label} {name}"), name, textures, format)
+        };
+        Self {
+            label,
+            settings: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(&format!("{label} settings")),
+                size: size_of::<Settings>() as u64,
+                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            source: pass("fs_source", &[POSITIONS, IRRADIANCE], SCRATCH),
+            rows: pass("fs_rows", &[POSITIONS, SOURCE], SCRATCH),
+            sum: pass("fs_sum", &[POSITIONS, SOURCE, ROWS, SUM], SCRATCH),
+            resolve: pass("fs_resolve", &[POSITIONS, IRRADIANCE, SUM], output_format),
+            scratch: None,
+            frame: None,
+        }
+    }
+
+    pub fn prepare(&mut self, device: &Device, queue: &Queue, inputs: &Inputs) {
+        let texture = inputs.irradiance.texture();
+        let size = [texture.width(), texture.height()];
+        if self.scratch.as_ref().is_none_or(|s| s.size != size) {
+            self.scratch = None; // The old one goes before the new one comes.
+        }
+        let label = self.label;
+        let scratch = self
+            .scratch
+            .get_or_insert_with(|| Scratch::new(device, size, label));
+        queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&inputs.settings));
+
+        let group = |pass: &Pass, sum: usize| {
+            pass.bind(device, &self.settings, |binding| match binding {
+                POSITIONS => inputs.positions,
+                IRRADIANCE => inputs.irradiance,
+                SOURCE => &scratch.source,
+                ROWS => &scratch.rows,
+                _ => &scratch.sums[sum],
+            })
+        };
+        let gaussians = inputs
+            .profiles
+            .iter()
+            .map(|p| p.gaussians().len())
+            .max()
+            .unwrap_or(0);
+        self.frame = Some(Frame {
+            gaussians: gaussians as u32,
+            output: inputs.output.clone(),
+            source: group(&self.source, 0),
+            rows: group(&self.rows, 0),
+            sums: [group(&self.sum, 0), group(&self.sum, 1)],
+            resolve: group(&self.resolve, gaussians % 2),
+        });
+    }
+
+    pub fn render(&self, encoder: &mut CommandEncoder) {
+        let (Some(scratch), Some(frame)) = (&self.scratch, &self.frame) else {
+            return;
+        };
+        self.source.draw(encoder, &frame.source, &scratch.source, 0);
+        for i in 0..frame.gaussians {
+            let from = i as usize % 2;
+            self.rows.draw(encoder, &frame.rows, &scratch.rows, i);
+            self.sum
+                .draw(encoder, &frame.sums[from], &scratch.sums[1 - from], i);
+        }
+        self.resolve.draw(encoder, &frame.resolve, &frame.output, 0);
+    }
+}
+
+impl Scratch {
+    fn new(device: &Device, size: [u32; 2], label: &str) -> Self {
+        let view = |name: &str| scratch_view(device, &format!("{label} {name}"), size);
+        Self {
+            size,
+            source: view("source"),
+            rows: view("rows"),
+            sums: [view("sum 0"), view("sum 1")],
+        }
+    }
+}
+
+/// A full-float texture that passes hand to each other.
+pub(crate) fn scratch_view(device: &Device, label: &str, size: [u32; 2]) -> TextureView {
+    device
+        .create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width: size[0],
+                height: size[1],
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: SCRATCH,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        })
+        .create_view(&Default::default())
+}
+
+/// A texture that shaders load floats from; depth formats are floats, too.
+pub(crate) fn float_texture(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    texture(binding, wgpu::TextureSampleType::Float { filterable: false })
+}
+
+/// A texture that shaders load unsigned integers from.
+pub(crate) fn uint_texture(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    texture(binding, wgpu::TextureSampleType::Uint)
+}
+
+fn texture(binding: u32, sample_type: wgpu::TextureSampleType) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::FRAGMENT,
+        ty: wgpu::BindingType::Texture {
+            sample_type,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        },
+        count: None,
+    }
+}
+
+/// The uniform buffer of a pass, at binding 0.
+pub(crate) const UNIFORM: wgpu::BindGroupLayoutEntry = wgpu::BindGroupLayoutEntry {
+    binding: 0,
+    visibility: wgpu::ShaderStages::FRAGMENT,
+    ty: wgpu::BindingType::Buffer {
+        ty: wgpu::BufferBindingType::Uniform,
+        has_dynamic_offset: false,
+        min_binding_size: None,
+    },
+    count: None,
+};
+
+/// A pipeline that draws one triangle over its target.
+pub(crate) fn full_screen(
+    device: &Device,
+    shader: &wgpu::ShaderModule,
+    label: &str,
+    entry_point: &str,
+    layout: &BindGroupLayout,
+    format: TextureFormat,
+) -> RenderPipeline {
+    let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(label),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    });
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(label),
+        layout: Some(&pipeline_layout),
+        vertex: wgpu::VertexState {
+            module: shader,
+            entry_point: Some("vs_main"),
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: Default::default(),
+        depth_stencil: None,
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: shader,
+            entry_point: Some(entry_point),
+            compilation_options: Default::default(),
+            targets: &[Some(format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+/// Draws `pipeline` over all of `target`; the instance index carries `instance`.
+pub(crate) fn draw_full_screen(
+    encoder: &mut CommandEncoder,
+    label: &str,
+    pipeline: &RenderPipeline,
+    group: &BindGroup,
+    target: &TextureView,
+    instance: u32,
+) {
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(label),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: target,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                // Every pixel is written; clearing spares tilers the load.
+                load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                store: wgpu::StoreOp::Store,
+            },
+        })],
+        ..Default::default()
+    });
+    pass.set_pipeline(pipeline);
+    pass.set_bind_group(0, group, &[]);
+    pass.draw(0..3, instance..instance + 1);
+}
+
+impl Pass {
+    fn new(
+        device: &Device,
+        shader: &wgpu::ShaderModule,
+        label: &str,
+        entry_point: &str,
+        textures: &[u32],
+        format: TextureFormat,
+    ) -> Self {
+        let mut entries = vec![UNIFORM];
+        entries.extend(textures.iter().map(|&binding| float_texture(binding)));
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(label),
+            entries: &entries,
+        });
+        Self {
+            label: label.into(),
+            pipeline: full_screen(device, shader, label, entry_point, &layout, format),
+            textures: textures.to_vec(),
+            layout,
+        }
+    }
+
+    fn bind<'a>(
+        &self,
+        device: &Device,
+        settings: &wgpu::Buffer,
+        view: impl Fn(u32) -> &'a TextureView,
+    ) -> BindGroup {
+        let mut entries = vec![wgpu::BindGroupEntry {
+            binding: 0,
+            resource: settings.as_entire_binding(),
+        }];
+        entries.extend(self.textures.iter().map(|&binding| wgpu::BindGroupEntry {
+            binding,
+            resource: wgpu::BindingResource::TextureView(view(binding)),
+        }));
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(&self.label),
+            layout: &self.layout,
+            entries: &entries,
+        })
+    }
+
+    fn draw(&self, encoder: &mut CommandEncoder, group: &BindGroup, to: &TextureView, i: u32) {
+        draw_full_screen(encoder, &self.label, &self.pipeline, group, to, i);
+    }
+}

@@ -1,0 +1,202 @@
+//! Diffusion profiles: how far light travels under the surface, per colour.
+
+use glam::Vec3;
+
+use crate::Error;
+
+/// One term wᵢ·G(vᵢ, r) of a profile, with G(v, r) = exp(−r²/2v)/(2πv).
+///
+/// Li & Shao 2015 print Eq. 10 without the 1/v; their Eq. 12 needs it (docs/method.md).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gaussian {
+    /// Variance vᵢ along one axis, in mm². Zero leaves light where it fell.
+    pub variance_mm2: f32,
+    /// Weight wᵢ of the linear red, green and blue light, each at least 0.
+    pub weight: Vec3,
+}
+
+/// A diffusion profile R(r) = Σ wᵢ·G(vᵢ, r) (Li & Shao 2015, Eq. 9) of 1 to 8 Gaussians.
+///
+/// The weights of each colour sum to 1, so that scattering neither adds nor takes energy; what
+/// the skin absorbs is the business of the albedo.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Profile {
+    gaussians: [Gaussian; Self::MAX_GAUSSIANS],
+    len: usize,
+}
+
+const NONE: Gaussian = gaussian(0.0, 0.0, 0.0, 0.0);
+
+const fn gaussian(variance_mm2: f32, red: f32, green: f32, blue: f32) -> Gaussian {
+    Gaussian {
+        variance_mm2,
+        weight: Vec3::new(red, green, blue),
+    }
+}
+
+impl Profile {
+    /// The most Gaussians a profile can have.
+    pub const MAX_GAUSSIANS: usize = 8;
+
+    /// Skin, the six Gaussians of d'Eon & Luebke (GPU Gems 3, ch. 14).
+    pub const SKIN: Self = Self {
+        gaussians: [
+            gaussian(0.0064, 0.233, 0.455, 0.649),
+            gaussian(0.0484, 0.100, 0.336, 0.344),
+            gaussian(0.187, 0.118, 0.198, 0.0),
+            gaussian(0.567, 0.113, 0.007, 0.007),
+            gaussian(1.99, 0.358, 0.004, 0.0),
+            gaussian(7.41, 0.078, 0.0, 0.0),
+            NONE,
+            NONE,
+        ],
+        len: 6,
+    };
+
+    /// A profile of the given Gaussians, in any order; each colour's weights are scaled to sum
+    /// to 1.
+    ///
+    /// # Errors
+    /// None or more than 8 Gaussians; a variance or weight that is negative or not finite; a
+    /// colour whose weights sum to nothing.
+    pub fn new(gaussians: &[Gaussian]) -> Result<Self, Error> {
+        if gaussians.is_empty() || gaussians.len() > Self::MAX_GAUSSIANS {
+            return Err(Error::new(
+                "profile",
+                format!("{} Gaussians", gaussians.len()),
+                format!("1 to {}", Self::MAX_GAUSSIANS),
+            ));
+        }
+        for (i, g) in gaussians.iter().enumerate() {
+            if !g.variance_mm2.is_finite() || g.variance_mm2 < 0.0 {
+                return Err(Error::new(
+                    format!("profile: variance_mm2 of Gaussian {i}"),
+                    g.variance_mm2.to_string(),
+                    "a finite number of mm², at least 0",
+                ));
+            }
+            if !g.weight.is_finite() || g.weight.min_element() < 0.0 {
+                return Err(Error::new(
+                    format!("profile: weight of Gaussian {i}"),
+                    g.weight.to_string(),
+                    "three finite numbers, each at least 0",
+                ));
+            }
+        }
+        let sum: Vec3 = gaussians.iter().map(|g| g.weight).sum();
+        // Below the least normal number the division would overflow.
+        if !sum.is_finite() || sum.min_element() < f32::MIN_POSITIVE {
+            return Err(Error::new(
+                "profile: sum of the weights",
+                sum.to_string(),
+                "a finite sum above 0 in every colour",
+            ));
+        }
+        let mut profile = Self {
+            gaussians: [NONE; Self::MAX_GAUSSIANS],
+            len: gaussians.len(),
+        };
+        for (to, from) in profile.gaussians.iter_mut().zip(gaussians) {
+            *to = Gaussian {
+                variance_mm2: from.variance_mm2,
+                weight: from.weight / sum,
+            };
+        }
+        Ok(profile)
+    }
+
+    /// A profile from JSON, as in
+    /// `{"gaussians": [{"variance_mm2": 0.0064, "weight": [0.233, 0.455, 0.649]}]}`.
+    ///
+    /// # Errors
+    /// Text that is not of this form, and all that [`Profile::new`] refuses.
+    #[cfg(feature = "json")]
+    pub fn from_json(text: &str) -> Result<Self, Error> {
+        #[derive(serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct File {
+            gaussians: Vec<Term>,
+        }
+        #[derive(serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Term {
+            variance_mm2: f32,
+            weight: [f32; 3],
+        }
+        let file: File = serde_json::from_str(text).map_err(|e| {
+            Error::new(
+                "profile",
+                e.to_string(),
+                r#"{"gaussians": [{"variance_mm2": v, "weight": [r, g, b]}, …]}"#,
+            )
+        })?;
+        let gaussians: Vec<_> = file
+            .gaussians
+            .iter()
+            .map(|t| Gaussian {
+                variance_mm2: t.variance_mm2,
+                weight: t.weight.into(),
+            })
+            .collect();
+        Self::new(&gaussians)
+    }
+
+    /// The Gaussians; the weights of each colour sum to 1.
+    pub fn gaussians(&self) -> &[Gaussian] {
+        &self.gaussians[..self.len]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gaussian(variance_mm2: f32, weight: f32) -> Gaussian {
+        Gaussian {
+            variance_mm2,
+            weight: Vec3::splat(weight),
+        }
+    }
+
+    #[test]
+    fn skin_keeps_energy() {
+        let sum: Vec3 = Profile::SKIN.gaussians().iter().map(|g| g.weight).sum();
+        // Three printed decimals, six terms.
+        assert!((sum - Vec3::ONE).abs().max_element() < 1e-6, "{sum}");
+        assert_eq!(Profile::new(Profile::SKIN.gaussians()), Ok(Profile::SKIN));
+    }
+
+    #[test]
+    fn weights_are_scaled_to_one() {
+        let profile = Profile::new(&[gaussian(1.0, 3.0), gaussian(2.0, 1.0)]).unwrap();
+        assert_eq!(profile.gaussians()[0].weight, Vec3::splat(0.75));
+    }
+
+    #[test]
+    fn refuses_what_cannot_scatter() {
+        for (bad, says) in [
+            (vec![], "0 Gaussians"),
+            (vec![gaussian(1.0, 1.0); 9], "9 Gaussians"),
+            (vec![gaussian(-1.0, 1.0)], "-1"),
+            (vec![gaussian(f32::NAN, 1.0)], "NaN"),
+            (vec![gaussian(1.0, f32::INFINITY)], "inf"),
+            (vec![gaussian(1.0, -0.5), gaussian(1.0, 1.0)], "-0.5"),
+            (vec![gaussian(1.0, 0.0)], "sum"),
+            (vec![gaussian(1.0, f32::MAX); 2], "sum"),
+        ] {
+            let error = Profile::new(&bad).unwrap_err().to_string();
+            assert!(error.contains(says), "{error} does not say {says}");
+        }
+    }
+
+    #[cfg(feature = "json")]
+    #[test]
+    fn reads_json() {
+        let text = r#"{"gaussians": [{"variance_mm2": 0.5, "weight": [1, 2, 4]}]}"#;
+        let profile = Profile::from_json(text).unwrap();
+        assert_eq!(profile.gaussians(), [gaussian(0.5, 1.0)]);
+        for bad in ["", "[]", r#"{"gaussians": [{"variance": 1}]}"#, &text[..20]] {
+            assert_eq!(Profile::from_json(bad).unwrap_err().input, "profile");
+        }
+    }
+}

@@ -1,0 +1,259 @@
+//! The host's side of texture space: draws each UV page of each mesh into an atlas, has it
+//! scattered, and draws the result back onto the screen. Driver of `shaders/renderer/atlas.wgsl`
+//! and `resample.wgsl`.
+
+use std::time::Instant;
+
+use wgpu::TextureFormat;
+
+use super::{Gpu, IRRADIANCE, Renderer, mesh::Mesh};
+use crate::{Atlas, Error, Profile, TextureSpace};
+
+/// The atlas of one page, used for one after the other.
+pub struct AtlasRenderer {
+    irradiance: wgpu::TextureView,
+    positions: wgpu::TextureView,
+    scattered: wgpu::TextureView,
+    effect: TextureSpace,
+    light: wgpu::RenderPipeline,
+    resample: wgpu::RenderPipeline,
+    resample_group: wgpu::BindGroup,
+}
+
+/// Wall time of the two halves of scattering in texture space, submit and wait, in ms.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AtlasTimes {
+    /// Drawing and lighting the meshes in their UV space.
+    pub raster_ms: f64,
+    /// The effect.
+    pub blur_ms: f64,
+}
+
+impl AtlasRenderer {
+    /// An atlas of `size` × `size` texels a page.
+    ///
+    /// # Errors
+    /// A size of 0 or beyond the device's limit.
+    pub fn new(gpu: &Gpu, renderer: &Renderer, size: u32) -> Result<Self, Error> {
+        let limit = gpu.device.limits().max_texture_dimension_2d;
+        if size == 0 || size > limit {
+            return Err(Error::new(
+                "texture size",
+                size.to_string(),
+                format!("1 to {limit}"),
+            ));
+        }
+        let size = [size, size];
+        let device = &gpu.device;
+        let light_shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("subsurface::renderer atlas"),
+            source: wgpu::ShaderSource::Wgsl(
+                [
+                    TextureSpace::VERTEX_WGSL,
+                    include_str!("../../shaders/renderer/material.wgsl"),
+                    include_str!("../../shaders/renderer/lighting.wgsl"),
+                    include_str!("../../shaders/renderer/atlas.wgsl"),
+                ]
+                .concat()
+                .into(),
+            ),
+        });
+        let light = super::mesh_pipeline(
+            gpu,
+            "subsurface::renderer atlas",
+            &light_shader,
+            ["vs_atlas", "fs_atlas"],
+            &[
+                Some(&renderer.camera_layout),
+                Some(&renderer.material_layout),
+                Some(&renderer.lights.layout),
+            ],
+            &[IRRADIANCE, TextureFormat::Rgba32Float],
+            None,
+        );
+
+        let resample_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("subsurface::renderer resample"),
+            entries: &[
+                wgpu::BindGroupLayoutEntry {
+                    binding: 0,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Texture {
+                        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+                        view_dimension: wgpu::TextureViewDimension::D2,
+                        multisampled: false,
+                    },
+                    count: None,
+                },
+                wgpu::BindGroupLayoutEntry {
+                    binding: 1,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+                    count: None,
+                },
+            ],
+        });
+        let resample_shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some("subsurface::renderer resample"),
+            source: wgpu::ShaderSource::Wgsl(
+                [
+                    include_str!("../../shaders/renderer/material.wgsl"),
+                    include_str!("../../shaders/renderer/resample.wgsl"),
+                ]
+                .concat()
+                .into(),
+            ),
+        });
+        let resample = super::mesh_pipeline(
+            gpu,
+            "subsurface::renderer resample",
+            &resample_shader,
+            ["vs_screen", "fs_resample"],
+            &[
+                Some(&renderer.camera_layout),
+                Some(&renderer.material_layout),
+                Some(&resample_layout),
+            ],
+            &[IRRADIANCE],
+            Some(super::depth_state(wgpu::CompareFunction::Equal, false)),
+        );
+
+        let target = |name, format| gpu.target(name, size, format);
+        let scattered = target("subsurface::renderer atlas scattered", IRRADIANCE);
+        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("subsurface::renderer resample"),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
+        });
+        let resample_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("subsurface::renderer resample"),
+            layout: &resample_layout,
+            entries: &[
+                wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: wgpu::BindingResource::TextureView(&scattered),
+                },
+                wgpu::BindGroupEntry {
+                    binding: 1,
+                    resource: wgpu::BindingResource::Sampler(&sampler),
+                },
+            ],
+        });
+        Ok(Self {
+            irradiance: target("subsurface::renderer atlas irradiance", IRRADIANCE),
+            positions: target(
+                "subsurface::renderer atlas positions",
+                TextureFormat::Rgba32Float,
+            ),
+            scattered,
+            effect: TextureSpace::new(device, IRRADIANCE)?,
+            light,
+            resample,
+            resample_group,
+        })
+    }
+
+    /// Scatters the scene as `renderer` last lit it and draws the result into `output`, which
+    /// elsewhere takes the irradiance as it was.
+    ///
+    /// # Errors
+    /// A primitive that scatters and has no UVs.
+    pub fn render(
+        &mut self,
+        gpu: &Gpu,
+        renderer: &Renderer,
+        profiles: &[Profile],
+        mm_per_unit: f32,
+        output: &wgpu::TextureView,
+    ) -> Result<AtlasTimes, Error> {
+        let skin = || renderer.meshes.iter().filter(|m| m.profile_id != 0);
+        if let Some(mesh) = skin().find(|m| m.pages.is_empty()) {
+            return Err(Error::new(
+                format!("texture space: {}", mesh.name),
+                "no UVs",
+                "TEXCOORD_0 (screen space does without)",
+            ));
+        }
+        gpu.run(|encoder| {
+            encoder.copy_texture_to_texture(
+                renderer.gbuffer.irradiance.texture().as_image_copy(),
+                output.texture().as_image_copy(),
+                output.texture().size(),
+            );
+        });
+        let mut times = AtlasTimes::default();
+        for mesh in skin() {
+            for page in &mesh.pages {
+                let start = Instant::now();
+                gpu.run(|encoder| self.draw_atlas(encoder, renderer, mesh, page.clone()));
+                times.raster_ms += start.elapsed().as_secs_f64() * 1e3;
+
+                let start = Instant::now();
+                self.effect.prepare(
+                    &gpu.device,
+                    &gpu.queue,
+                    &Atlas {
+                        irradiance: &self.irradiance,
+                        positions: &self.positions,
+                        output: &self.scattered,
+                        mm_per_unit,
+                        profiles,
+                    },
+                )?;
+                gpu.run(|encoder| self.effect.render(encoder));
+                times.blur_ms += start.elapsed().as_secs_f64() * 1e3;
+
+                gpu.run(|encoder| self.draw_screen(encoder, renderer, mesh, page.clone(), output));
+            }
+        }
+        Ok(times)
+    }
+
+    fn draw_atlas(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        renderer: &Renderer,
+        mesh: &Mesh,
+        page: std::ops::Range<u32>,
+    ) {
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("subsurface::renderer atlas"),
+            color_attachments: &[
+                Some(super::color_attachment(&self.irradiance, clear)),
+                Some(super::color_attachment(&self.positions, clear)),
+            ],
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.light);
+        pass.set_bind_group(0, &renderer.camera_group, &[]);
+        pass.set_bind_group(1, &mesh.material, &[]);
+        pass.set_bind_group(2, &renderer.lights.group, &[]);
+        mesh.draw(&mut pass, page);
+    }
+
+    fn draw_screen(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        renderer: &Renderer,
+        mesh: &Mesh,
+        page: std::ops::Range<u32>,
+        output: &wgpu::TextureView,
+    ) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("subsurface::renderer resample"),
+            color_attachments: &[Some(super::color_attachment(output, wgpu::LoadOp::Load))],
+            depth_stencil_attachment: Some(super::depth_attachment(
+                &renderer.gbuffer.depth,
+                wgpu::LoadOp::Load,
+            )),
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.resample);
+        pass.set_bind_group(0, &renderer.camera_group, &[]);
+        pass.set_bind_group(1, &mesh.material, &[]);
+        pass.set_bind_group(2, &self.resample_group, &[]);
+        mesh.draw(&mut pass, page);
+    }
+}

@@ -1,0 +1,537 @@
+//! A small deferred renderer that plays the host in the examples and tests. It knows the effects
+//! only as any host would.
+//!
+//! [`Renderer::render`] fills a [`GBuffer`]; a mode of scattering turns its irradiance into
+//! another texture (or none does); [`Renderer::compose`] makes the picture from the one or the
+//! other.
+
+mod atlas;
+mod camera;
+mod gpu;
+mod lighting;
+mod mesh;
+mod pages;
+mod scene;
+
+pub use atlas::{AtlasRenderer, AtlasTimes};
+pub use camera::{Camera, View};
+pub use gpu::Gpu;
+pub use lighting::{Light, Lighting, Sky, Specular};
+pub use scene::{Image, Material, Primitive, Scene, Vertex};
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Vec3};
+use wgpu::{TextureFormat, TextureView};
+
+use crate::Error;
+use lighting::Lights;
+use mesh::Mesh;
+
+/// Of irradiance, before and after scattering.
+const IRRADIANCE: TextureFormat = TextureFormat::Rgba16Float;
+const DEPTH: TextureFormat = TextureFormat::Depth32Float;
+const PICTURE: TextureFormat = TextureFormat::Rgba8UnormSrgb;
+
+/// What a frame leaves for the passes after it.
+pub struct GBuffer {
+    /// Linear albedo; alpha is the material's Beckmann slope. Rgba16Float.
+    pub albedo: TextureView,
+    /// View-space normals. Rgba16Float.
+    pub normal: TextureView,
+    /// Scattering profile, 0 for none. R8Uint.
+    pub profile_id: TextureView,
+    /// Reversed, infinite depth; 0 where nothing is. Depth32Float.
+    pub depth: TextureView,
+    /// Lit diffuse irradiance/π: the radiance of a white diffuse surface. Rgba16Float.
+    pub irradiance: TextureView,
+    /// Surface reflection. Rgba16Float.
+    pub specular: TextureView,
+}
+
+/// What [`Renderer::compose`] shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layer {
+    /// The finished picture.
+    Picture,
+    /// The diffuse irradiance alone, without albedo.
+    Diffuse,
+}
+
+/// A scene on the device, and the passes that draw it at one size.
+pub struct Renderer {
+    /// Filled by [`Renderer::render`].
+    pub gbuffer: GBuffer,
+    size: [u32; 2],
+    bounds: (Vec3, Vec3),
+    meshes: Vec<Mesh>,
+    lights: Lights,
+    camera: wgpu::Buffer,
+    camera_layout: wgpu::BindGroupLayout,
+    camera_group: wgpu::BindGroup,
+    material_layout: wgpu::BindGroupLayout,
+    draw: wgpu::RenderPipeline,
+    shade: wgpu::RenderPipeline,
+    shade_group: wgpu::BindGroup,
+    compose: wgpu::RenderPipeline,
+    compose_layout: wgpu::BindGroupLayout,
+}
+
+/// `Camera` of the shaders.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct CameraUniform {
+    view: Mat4,
+    view_projection: Mat4,
+    inverse_view_projection: Mat4,
+    eye: Vec3,
+    mm_per_unit: f32,
+}
+
+/// `Compose` of the shader.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct ComposeUniform {
+    exposure: f32,
+    layer: u32,
+    pad: [u32; 2],
+}
+
+impl Renderer {
+    /// Uploads a scene, for pictures of `size` pixels.
+    ///
+    /// # Errors
+    /// A size of 0 or beyond the device's limit.
+    pub fn new(gpu: &Gpu, scene: &Scene, size: [u32; 2]) -> Result<Self, Error> {
+        let device = &gpu.device;
+        let limit = device.limits().max_texture_dimension_2d;
+        if size.iter().any(|&s| s == 0 || s > limit) {
+            return Err(Error::new(
+                "size",
+                format!("{}x{}", size[0], size[1]),
+                format!("1 to {limit} pixels each way"),
+            ));
+        }
+        let target = |name, format| gpu.target(name, size, format);
+        let gbuffer = GBuffer {
+            albedo: target("subsurface::renderer albedo", TextureFormat::Rgba16Float),
+            normal: target("subsurface::renderer normal", TextureFormat::Rgba16Float),
+            profile_id: target("subsurface::renderer profile id", TextureFormat::R8Uint),
+            depth: target("subsurface::renderer depth", DEPTH),
+            irradiance: target("subsurface::renderer irradiance", IRRADIANCE),
+            specular: target("subsurface::renderer specular", TextureFormat::Rgba16Float),
+        };
+        let camera_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("subsurface::renderer camera"),
+            entries: &[uniform_entry(wgpu::ShaderStages::VERTEX_FRAGMENT)],
+        });
+        let camera = gpu.uniform::<CameraUniform>("subsurface::renderer camera");
+        let camera_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("subsurface::renderer camera"),
+            layout: &camera_layout,
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: camera.as_entire_binding(),
+            }],
+        });
+        let material_layout = Mesh::material_layout(gpu);
+        let lights = Lights::new(gpu);
+        let module = |name, parts: &[&str]| {
+            device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(name),
+                source: wgpu::ShaderSource::Wgsl(parts.concat().into()),
+            })
+        };
+
+        let draw = mesh_pipeline(
+            gpu,
+            "subsurface::renderer gbuffer",
+            &module(
+                "subsurface::renderer gbuffer",
+                &[
+                    include_str!("../../shaders/renderer/material.wgsl"),
+                    include_str!("../../shaders/renderer/gbuffer.wgsl"),
+                ],
+            ),
+            ["vs_screen", "fs_gbuffer"],
+            &[Some(&camera_layout), Some(&material_layout)],
+            &[
+                TextureFormat::Rgba16Float,
+                TextureFormat::Rgba16Float,
+                TextureFormat::R8Uint,
+            ],
+            Some(depth_state(wgpu::CompareFunction::Greater, true)),
+        );
+
+        let (shade_layout, shade_group) = textures(
+            gpu,
+            "subsurface::renderer deferred",
+            None,
+            &[
+                &gbuffer.albedo,
+                &gbuffer.normal,
+                &gbuffer.profile_id,
+                &gbuffer.depth,
+            ],
+        );
+        let shade = full_screen_pipeline(
+            gpu,
+            "subsurface::renderer deferred",
+            &module(
+                "subsurface::renderer deferred",
+                &[
+                    include_str!("../../shaders/renderer/material.wgsl"),
+                    include_str!("../../shaders/renderer/lighting.wgsl"),
+                    include_str!("../../shaders/renderer/deferred.wgsl"),
+                ],
+            ),
+            "fs_lighting",
+            &[
+                Some(&camera_layout),
+                None,
+                Some(&lights.layout),
+                Some(&shade_layout),
+            ],
+            &[IRRADIANCE, TextureFormat::Rgba16Float],
+        );
+
+        let compose_uniform = gpu.uniform::<ComposeUniform>("subsurface::renderer compose");
+        let (compose_layout, _) = textures(
+            gpu,
+            "subsurface::renderer compose",
+            Some(&compose_uniform),
+            &[
+                &gbuffer.irradiance,
+                &gbuffer.albedo,
+                &gbuffer.specular,
+                &gbuffer.depth,
+            ],
+        );
+        let compose = full_screen_pipeline(
+            gpu,
+            "subsurface::renderer compose",
+            &module(
+                "subsurface::renderer compose",
+                &[include_str!("../../shaders/renderer/compose.wgsl")],
+            ),
+            "fs_compose",
+            &[Some(&compose_layout)],
+            &[PICTURE],
+        );
+        Ok(Self {
+            meshes: Mesh::upload(gpu, scene, &material_layout),
+            bounds: scene.bounds(),
+            size,
+            gbuffer,
+            lights,
+            camera,
+            camera_layout,
+            camera_group,
+            material_layout,
+            draw,
+            shade,
+            shade_group,
+            compose,
+            compose_layout,
+        })
+    }
+
+    /// Draws and lights the scene into the G-buffer.
+    ///
+    /// # Errors
+    /// Lights that cannot be used.
+    pub fn render(
+        &self,
+        gpu: &Gpu,
+        camera: &Camera,
+        lighting: &Lighting,
+        mm_per_unit: f32,
+    ) -> Result<(), Error> {
+        let view_projection = camera.projection(self.size) * camera.view();
+        let uniform = CameraUniform {
+            view: camera.view(),
+            view_projection,
+            // In double precision, since the far plane is infinitely far away.
+            inverse_view_projection: view_projection.as_dmat4().inverse().as_mat4(),
+            eye: camera.eye,
+            mm_per_unit,
+        };
+        gpu.queue
+            .write_buffer(&self.camera, 0, bytemuck::bytes_of(&uniform));
+        self.lights
+            .render(gpu, lighting, &self.meshes, self.bounds)?;
+
+        let g = &self.gbuffer;
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+        gpu.run(|encoder| {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("subsurface::renderer gbuffer"),
+                color_attachments: &[&g.albedo, &g.normal, &g.profile_id]
+                    .map(|view| Some(color_attachment(view, clear))),
+                depth_stencil_attachment: Some(depth_attachment(
+                    &g.depth,
+                    wgpu::LoadOp::Clear(0.0),
+                )),
+                ..Default::default()
+            });
+            pass.set_pipeline(&self.draw);
+            pass.set_bind_group(0, &self.camera_group, &[]);
+            for mesh in &self.meshes {
+                pass.set_bind_group(1, &mesh.material, &[]);
+                mesh.draw(&mut pass, 0..mesh.index_count);
+            }
+            drop(pass);
+
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("subsurface::renderer deferred"),
+                color_attachments: &[&g.irradiance, &g.specular]
+                    .map(|view| Some(color_attachment(view, clear))),
+                ..Default::default()
+            });
+            pass.set_pipeline(&self.shade);
+            pass.set_bind_group(0, &self.camera_group, &[]);
+            pass.set_bind_group(2, &self.lights.group, &[]);
+            pass.set_bind_group(3, &self.shade_group, &[]);
+            pass.draw(0..3, 0..1);
+        });
+        Ok(())
+    }
+
+    /// A target for scattered irradiance, of this renderer's size and format.
+    pub fn scattered_target(&self, gpu: &Gpu) -> TextureView {
+        gpu.target("subsurface::renderer scattered", self.size, IRRADIANCE)
+    }
+
+    /// The picture that a diffuse layer gives: tone-mapped sRGB bytes, red, green, blue.
+    pub fn compose(
+        &self,
+        gpu: &Gpu,
+        diffuse: &TextureView,
+        layer: Layer,
+        exposure: f32,
+    ) -> Vec<[u8; 3]> {
+        let picture = gpu.target("subsurface::renderer picture", self.size, PICTURE);
+        let uniform = gpu.uniform::<ComposeUniform>("subsurface::renderer compose");
+        gpu.queue.write_buffer(
+            &uniform,
+            0,
+            bytemuck::bytes_of(&ComposeUniform {
+                exposure,
+                layer: (layer == Layer::Diffuse).into(),
+                pad: [0; 2],
+            }),
+        );
+        let g = &self.gbuffer;
+        let (_, group) = textures(
+            gpu,
+            "subsurface::renderer compose",
+            Some(&uniform),
+            &[diffuse, &g.albedo, &g.specular, &g.depth],
+        );
+        gpu.run(|encoder| {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("subsurface::renderer compose"),
+                color_attachments: &[Some(color_attachment(
+                    &picture,
+                    wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                ))],
+                ..Default::default()
+            });
+            pass.set_pipeline(&self.compose);
+            pass.set_bind_group(0, &group, &[]);
+            pass.draw(0..3, 0..1);
+        });
+        gpu.read_bytes(picture.texture())
+            .chunks_exact(4)
+            .map(|p| [p[0], p[1], p[2]])
+            .collect()
+    }
+}
+
+fn uniform_entry(visibility: wgpu::ShaderStages) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding: 0,
+        visibility,
+        ty: wgpu::BindingType::Buffer {
+            ty: wgpu::BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+        count: None,
+    }
+}
+
+/// A bind group of textures that a fragment shader loads from, behind a uniform buffer or not.
+fn textures(
+    gpu: &Gpu,
+    label: &str,
+    uniform: Option<&wgpu::Buffer>,
+    views: &[&TextureView],
+) -> (wgpu::BindGroupLayout, wgpu::BindGroup) {
+    let mut layout = Vec::new();
+    let mut entries = Vec::new();
+    if let Some(buffer) = uniform {
+        layout.push(uniform_entry(wgpu::ShaderStages::FRAGMENT));
+        entries.push(wgpu::BindGroupEntry {
+            binding: 0,
+            resource: buffer.as_entire_binding(),
+        });
+    }
+    for view in views {
+        let binding = layout.len() as u32;
+        let sample_type = match view.texture().format().sample_type(None, None) {
+            Some(wgpu::TextureSampleType::Uint) => wgpu::TextureSampleType::Uint,
+            _ => wgpu::TextureSampleType::Float { filterable: false },
+        };
+        layout.push(wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty: wgpu::BindingType::Texture {
+                sample_type,
+                view_dimension: wgpu::TextureViewDimension::D2,
+                multisampled: false,
+            },
+            count: None,
+        });
+        entries.push(wgpu::BindGroupEntry {
+            binding,
+            resource: wgpu::BindingResource::TextureView(view),
+        });
+    }
+    let layout = gpu
+        .device
+        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(label),
+            entries: &layout,
+        });
+    let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some(label),
+        layout: &layout,
+        entries: &entries,
+    });
+    (layout, group)
+}
+
+fn depth_state(compare: wgpu::CompareFunction, write: bool) -> wgpu::DepthStencilState {
+    wgpu::DepthStencilState {
+        format: DEPTH,
+        depth_write_enabled: Some(write),
+        depth_compare: Some(compare),
+        stencil: Default::default(),
+        bias: Default::default(),
+    }
+}
+
+fn depth_attachment(
+    view: &TextureView,
+    load: wgpu::LoadOp<f32>,
+) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations {
+            load,
+            store: wgpu::StoreOp::Store,
+        }),
+        stencil_ops: None,
+    }
+}
+
+fn color_attachment(
+    view: &TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+) -> wgpu::RenderPassColorAttachment<'_> {
+    wgpu::RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations {
+            load,
+            store: wgpu::StoreOp::Store,
+        },
+    }
+}
+
+/// A pipeline that draws meshes, both sides of their triangles.
+fn mesh_pipeline(
+    gpu: &Gpu,
+    label: &str,
+    shader: &wgpu::ShaderModule,
+    [vertex, fragment]: [&str; 2],
+    groups: &[Option<&wgpu::BindGroupLayout>],
+    targets: &[TextureFormat],
+    depth_stencil: Option<wgpu::DepthStencilState>,
+) -> wgpu::RenderPipeline {
+    pipeline(
+        gpu,
+        label,
+        shader,
+        [vertex, fragment],
+        groups,
+        targets,
+        &[Mesh::VERTEX_LAYOUT],
+        depth_stencil,
+    )
+}
+
+/// A pipeline that draws one triangle over its targets.
+fn full_screen_pipeline(
+    gpu: &Gpu,
+    label: &str,
+    shader: &wgpu::ShaderModule,
+    fragment: &str,
+    groups: &[Option<&wgpu::BindGroupLayout>],
+    targets: &[TextureFormat],
+) -> wgpu::RenderPipeline {
+    pipeline(
+        gpu,
+        label,
+        shader,
+        ["vs_main", fragment],
+        groups,
+        targets,
+        &[],
+        None,
+    )
+}
+
+#[expect(clippy::too_many_arguments, reason = "all that two kinds of pipeline differ in")]
+fn pipeline(
+    gpu: &Gpu,
+    label: &str,
+    shader: &wgpu::ShaderModule,
+    [vertex, fragment]: [&str; 2],
+    groups: &[Option<&wgpu::BindGroupLayout>],
+    targets: &[TextureFormat],
+    buffers: &[Option<wgpu::VertexBufferLayout>],
+    depth_stencil: Option<wgpu::DepthStencilState>,
+) -> wgpu::RenderPipeline {
+    let layout = gpu
+        .device
+        .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(label),
+            bind_group_layouts: groups,
+            immediate_size: 0,
+        });
+    let targets: Vec<_> = targets.iter().map(|&f| Some(f.into())).collect();
+    gpu.device
+        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(label),
+            layout: Some(&layout),
+            vertex: wgpu::VertexState {
+                module: shader,
+                entry_point: Some(vertex),
+                compilation_options: Default::default(),
+                buffers,
+            },
+            primitive: Default::default(),
+            depth_stencil,
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: shader,
+                entry_point: Some(fragment),
+                compilation_options: Default::default(),
+                targets: &targets,
+            }),
+            multiview_mask: None,
+            cache: None,
+        })
+}

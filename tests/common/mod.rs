@@ -1,0 +1,369 @@
+//! What the tests share: one device, synthetic G-buffers with exact points and areas, the effect
+//! over them, and oracles that use no code of the effect.
+#![allow(dead_code)] // Each test binary uses a part of this.
+
+use std::sync::OnceLock;
+
+use glam::{DMat3, DMat4, DVec2, DVec3, DVec4, Mat4};
+use subsurface::renderer::Gpu;
+use subsurface::wgpu::TextureFormat;
+use subsurface::{Profile, ScreenFrame, ScreenSpace};
+
+/// The device of this test binary. Without an adapter the test fails and says what to do.
+pub fn gpu() -> &'static Gpu {
+    static GPU: OnceLock<Gpu> = OnceLock::new();
+    GPU.get_or_init(|| Gpu::headless().unwrap_or_else(|error| panic!("{error}")))
+}
+
+pub fn single_gaussian(variance_mm2: f32) -> Profile {
+    Profile::new(&[subsurface::Gaussian {
+        variance_mm2,
+        weight: glam::Vec3::ONE,
+    }])
+    .unwrap()
+}
+
+/// A point of a surface seen by a pixel, in view space and mm.
+#[derive(Clone, Copy)]
+pub struct Hit {
+    pub point: DVec3,
+    pub normal: DVec3,
+    pub irradiance: DVec3,
+    pub id: u32,
+}
+
+/// A camera: size in pixels and a projection of view space in mm.
+#[derive(Clone, Copy)]
+pub struct View {
+    pub size: [u32; 2],
+    pub projection: DMat4,
+}
+
+impl View {
+    /// Orthographic, looking down −Z from 200 mm, `px_per_mm` on both axes.
+    pub fn orthographic(size: [u32; 2], px_per_mm: f64) -> Self {
+        let half = DVec2::new(size[0].into(), size[1].into()) / px_per_mm / 2.0;
+        Self {
+            size,
+            projection: DMat4::from_cols(
+                DVec4::new(1.0 / half.x, 0.0, 0.0, 0.0),
+                DVec4::new(0.0, 1.0 / half.y, 0.0, 0.0),
+                DVec4::new(0.0, 0.0, -1.0 / 1000.0, 0.0),
+                DVec4::new(0.0, 0.0, 0.0, 1.0),
+            ),
+        }
+    }
+
+    /// Perspective with the given vertical field of view and an infinite, reversed depth whose
+    /// near plane is at 10 mm.
+    pub fn perspective(size: [u32; 2], fov_y_degrees: f64) -> Self {
+        let f = 1.0 / (fov_y_degrees.to_radians() / 2.0).tan();
+        let aspect = f64::from(size[0]) / f64::from(size[1]);
+        Self {
+            size,
+            projection: DMat4::from_cols(
+                DVec4::new(f / aspect, 0.0, 0.0, 0.0),
+                DVec4::new(0.0, f, 0.0, 0.0),
+                DVec4::new(0.0, 0.0, 0.0, -1.0),
+                DVec4::new(0.0, 0.0, 10.0, 0.0),
+            ),
+        }
+    }
+
+    /// Origin and direction (with z = −1) of the ray through a place in the picture.
+    pub fn ray(&self, pixel: DVec2) -> (DVec3, DVec3) {
+        let size = DVec2::new(self.size[0].into(), self.size[1].into());
+        let ndc = DVec2::new(pixel.x / size.x, 1.0 - pixel.y / size.y) * 2.0 - 1.0;
+        // x at clip: (P₀₀ x + P₀₂ z + P₀₃) / (P₃₂ z + P₃₃) = ndc, linear in z.
+        let at = |z: f64| {
+            let p = self.projection;
+            let w = p.z_axis.w * z + p.w_axis.w;
+            DVec3::new(
+                (ndc.x * w - p.z_axis.x * z - p.w_axis.x) / p.x_axis.x,
+                (ndc.y * w - p.z_axis.y * z - p.w_axis.y) / p.y_axis.y,
+                z,
+            )
+        };
+        (at(0.0), at(-1.0) - at(0.0))
+    }
+
+    /// The G-buffer of what `hit` finds along each ray.
+    pub fn shoot(&self, hit: impl Fn(DVec3, DVec3) -> Option<Hit>) -> GBuffer {
+        let mut hits = Vec::new();
+        let mut areas = Vec::new();
+        let mut pixels_mm2 = Vec::new();
+        for y in 0..self.size[1] {
+            for x in 0..self.size[0] {
+                let at = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                let (origin, ray) = self.ray(at);
+                let found = hit(origin, ray);
+                areas.push(found.map_or(0.0, |h| {
+                    // The pixel's corners on the tangent plane.
+                    let on_plane = |dx: f64, dy: f64| {
+                        let (o, d) = self.ray(at + DVec2::new(dx, dy));
+                        o + d * ((h.point - o).dot(h.normal) / d.dot(h.normal))
+                    };
+                    let du = on_plane(0.5, 0.0) - on_plane(-0.5, 0.0);
+                    let dv = on_plane(0.0, 0.5) - on_plane(0.0, -0.5);
+                    du.cross(dv).length()
+                }));
+                pixels_mm2.push(found.map_or(0.0, |h| {
+                    let facing = |dx: f64, dy: f64| {
+                        let (o, d) = self.ray(at + DVec2::new(dx, dy));
+                        o - d * h.point.z
+                    };
+                    let du = facing(0.5, 0.0) - facing(-0.5, 0.0);
+                    let dv = facing(0.0, 0.5) - facing(0.0, -0.5);
+                    du.cross(dv).length()
+                }));
+                hits.push(found);
+            }
+        }
+        GBuffer {
+            view: *self,
+            hits,
+            areas,
+            pixels_mm2,
+        }
+    }
+}
+
+/// Per pixel what is seen, its area in mm², and its area were it to face the camera.
+pub struct GBuffer {
+    pub view: View,
+    pub hits: Vec<Option<Hit>>,
+    pub areas: Vec<f64>,
+    pub pixels_mm2: Vec<f64>,
+}
+
+impl GBuffer {
+    /// The effect on the device, with full floats in and out.
+    pub fn scatter(&self, profile: &Profile) -> Vec<DVec3> {
+        self.scatter_all(std::slice::from_ref(profile), TextureFormat::Rgba32Float)
+            .iter()
+            .map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into()))
+            .collect()
+    }
+
+    pub fn scatter_all(&self, profiles: &[Profile], format: TextureFormat) -> Vec<[f32; 4]> {
+        let gpu = gpu();
+        let size = self.view.size;
+        let mut irradiance = Vec::new();
+        let mut depth = Vec::new();
+        let mut id = Vec::new();
+        for hit in &self.hits {
+            let e = hit.map_or(DVec3::splat(0.25), |h| h.irradiance).as_vec3();
+            irradiance.push([e.x, e.y, e.z, 0.5]);
+            depth.push(hit.map_or(0.0, |h| {
+                let clip = self.view.projection * h.point.extend(1.0);
+                (clip.z / clip.w) as f32
+            }));
+            id.push(hit.map_or(0, |h| h.id as u8));
+        }
+        let output = gpu.target("output", size, format);
+        let mut effect = ScreenSpace::new(&gpu.device, format).unwrap();
+        effect
+            .prepare(
+                &gpu.device,
+                &gpu.queue,
+                &ScreenFrame {
+                    irradiance: &gpu.upload(
+                        "irradiance",
+                        size,
+                        TextureFormat::Rgba32Float,
+                        &irradiance,
+                    ),
+                    depth: &gpu.upload("depth", size, TextureFormat::R32Float, &depth),
+                    profile_id: &gpu.upload("profile id", size, TextureFormat::R8Uint, &id),
+                    output: &output,
+                    projection: self.view.projection.as_mat4(),
+                    mm_per_unit: 1.0,
+                    profiles,
+                },
+            )
+            .unwrap();
+        gpu.run(|encoder| effect.render(encoder));
+        gpu.read(&output)
+    }
+
+    /// The visible integral at one pixel, per Gaussian normalised: every pixel, summed exactly,
+    /// by weights that spread by v on the pixels' lattice.
+    pub fn visible_sum(&self, pixel: usize, profile: &Profile) -> DVec3 {
+        let here = self.hits[pixel].expect("the visible integral is asked for on the surface");
+        let mut result = DVec3::ZERO;
+        for g in profile.gaussians() {
+            let v = lattice_variance(g.variance_mm2.into(), self.pixels_mm2[pixel]);
+            let (mut light, mut mass) = (DVec3::ZERO, 0.0);
+            for (hit, area) in self.hits.iter().zip(&self.areas) {
+                if let Some(there) = hit.filter(|h| h.id == here.id) {
+                    let r2 = there.point.distance_squared(here.point);
+                    let share = area * (-r2 / (2.0 * v)).exp();
+                    light += share * there.irradiance;
+                    mass += share;
+                }
+            }
+            result += g.weight.as_dvec3() * light / mass;
+        }
+        result
+    }
+
+    /// Pixels for which `select` holds, with what they see.
+    pub fn pixels(&self, select: impl Fn(&Hit) -> bool) -> Vec<(usize, Hit)> {
+        self.hits
+            .iter()
+            .enumerate()
+            .filter_map(|(i, h)| h.filter(&select).map(|h| (i, h)))
+            .collect()
+    }
+}
+
+/// A plane through the origin of view space shifted to z = −distance.
+pub fn plane(
+    normal: DVec3,
+    distance_mm: f64,
+    irradiance: impl Fn(DVec3) -> DVec3,
+) -> impl Fn(DVec3, DVec3) -> Option<Hit> {
+    move |origin, ray| {
+        let anchor = DVec3::new(0.0, 0.0, -distance_mm);
+        let point = origin + ray * ((anchor - origin).dot(normal) / ray.dot(normal));
+        (point.z < -1.0).then(|| Hit {
+            point,
+            normal,
+            irradiance: irradiance(point - anchor),
+            id: 1,
+        })
+    }
+}
+
+/// The near side of a sphere of radius `rho_mm` around (0, 0, −distance).
+pub fn sphere(
+    rho_mm: f64,
+    distance_mm: f64,
+    irradiance: impl Fn(DVec3) -> DVec3,
+) -> impl Fn(DVec3, DVec3) -> Option<Hit> {
+    move |origin, ray| {
+        let center = DVec3::new(0.0, 0.0, -distance_mm);
+        let (d, o) = (ray.normalize(), origin - center);
+        let b = o.dot(d);
+        let disc = b * b - o.length_squared() + rho_mm * rho_mm;
+        (disc >= 0.0).then(|| {
+            let normal = (o + d * (-b - disc.sqrt())) / rho_mm;
+            Hit {
+                point: center + normal * rho_mm,
+                normal,
+                irradiance: irradiance(normal),
+                id: 1,
+            }
+        })
+    }
+}
+
+/// The step edge at x mm, blurred by a Gaussian of this variance.
+pub fn step(x_mm: f64, variance_mm2: f64) -> f64 {
+    if variance_mm2 == 0.0 {
+        return if x_mm > 0.0 { 1.0 } else { 0.0 };
+    }
+    0.5 * (1.0 + libm::erf(x_mm / (2.0 * variance_mm2).sqrt()))
+}
+
+/// That edge, scattered by a profile.
+pub fn scattered_step(x_mm: f64, blur_mm2: f64, profile: &Profile) -> DVec3 {
+    profile
+        .gaussians()
+        .iter()
+        .map(|g| g.weight.as_dvec3() * step(x_mm, f64::from(g.variance_mm2) + blur_mm2))
+        .sum()
+}
+
+/// max(cos θ, 0) on a sphere, scattered by a profile by chord distance: Eq. 7 in closed form. A
+/// Gaussian of the chord is a von Mises–Fisher kernel, which scales the l-th Legendre coefficient
+/// by I_{l+½}(κ)/I_{½}(κ), κ = ρ²/v.
+pub fn scattered_cosine(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -> DVec3 {
+    const TERMS: usize = 1500;
+    let mut p_at_0 = 1.0;
+    let mut coefficients = vec![0.0; TERMS];
+    coefficients[0] = 0.25;
+    coefficients[1] = 0.5;
+    for l in (2..TERMS).step_by(2) {
+        let n = l as f64;
+        p_at_0 *= -(n - 1.0) / n;
+        // ∫₀¹ x P_l dx = −P_l(0)/((l−1)(l+2)).
+        coefficients[l] = (2.0 * n + 1.0) / 2.0 * -p_at_0 / ((n - 1.0) * (n + 2.0));
+    }
+    let mut scattered = vec![DVec3::ZERO; TERMS];
+    for g in profile.gaussians() {
+        let kappa = rho_mm * rho_mm / f64::from(g.variance_mm2);
+        // The ratio I_{l+½}/I_{l−½} by its continued fraction, from far above.
+        let mut ratio = 0.0;
+        let mut ratios = vec![0.0; TERMS];
+        for l in (1..TERMS + 20_000).rev() {
+            ratio = 1.0 / ((2 * l + 1) as f64 / kappa + ratio);
+            if l < TERMS {
+                ratios[l] = ratio;
+            }
+        }
+        let mut factor = 1.0;
+        for l in 0..TERMS {
+            if l > 0 {
+                factor *= ratios[l];
+            }
+            scattered[l] += g.weight.as_dvec3() * factor * coefficients[l];
+        }
+    }
+    move |cos_theta| {
+        let (mut p0, mut p1) = (1.0, cos_theta);
+        let mut sum = scattered[0] + scattered[1] * p1;
+        for (l, s) in scattered.iter().enumerate().skip(2) {
+            let n = l as f64;
+            let p = ((2.0 * n - 1.0) * cos_theta * p1 - (n - 1.0) * p0) / n;
+            (p0, p1) = (p1, p);
+            sum += *s * p;
+        }
+        sum
+    }
+}
+
+/// The variance whose point weights exp(−n²/2s) spread by `variance` on a lattice of cells of
+/// this area: by bisection of their second moment.
+pub fn lattice_variance(variance: f64, cell: f64) -> f64 {
+    let spread = |s: f64| {
+        let weight = |n: i32| (-f64::from(n * n) / (2.0 * s)).exp();
+        let sum = |f: &dyn Fn(i32) -> f64| (-20..=20).map(|n| f(n) * weight(n)).sum::<f64>();
+        sum(&|n| f64::from(n * n)) / sum(&|_| 1.0)
+    };
+    let wanted = variance / cell;
+    if wanted > 1.0 {
+        return variance; // The lattice no longer matters: 1e-6 at 1 px².
+    }
+    let (mut low, mut high) = (1e-4, 2.0);
+    for _ in 0..60 {
+        let middle = (low + high) / 2.0;
+        if spread(middle) < wanted { low = middle } else { high = middle }
+    }
+    low * cell
+}
+
+/// Root mean square.
+pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut n) = (0.0, 0);
+    for v in values {
+        sum += v * v;
+        n += 1;
+    }
+    assert!(n > 0, "nothing to take the mean of");
+    (sum / f64::from(n)).sqrt()
+}
+
+/// The projection as a host hands it over.
+pub fn host(projection: DMat4) -> Mat4 {
+    projection.as_mat4()
+}
+
+/// Rotates the normal (0, 0, 1) by `tilt` about the image axis at `axis`, both in degrees.
+pub fn tilted_normal(tilt: f64, axis: f64) -> DVec3 {
+    let axis = axis.to_radians();
+    DMat3::from_axis_angle(
+        DVec3::new(axis.cos(), axis.sin(), 0.0),
+        tilt.to_radians(),
+    ) * DVec3::Z
+}
