@@ -18,7 +18,6 @@ struct Settings {
     mm_per_unit: f32,
     // Pixels to which the result is carried past the edge of the surface.
     gutter: i32,
-    pad: vec2u,
 }
 
 @group(0) @binding(0) var<uniform> settings: Settings;
@@ -130,23 +129,26 @@ fn metric(pixel: vec2i, here: Point) -> Metric {
     return Metric(area, xy / xx, xx, spacing);
 }
 
-// Weights, and the variance that point weights need for a spread of v on a lattice of this spacing.
+fn gaussian(here: Point, i: u32) -> vec4f {
+    return settings.gaussians[8u * (here.profile - 1u) + i];
+}
+
+// The variance that point weights need to spread by v on a lattice of this spacing.
 //
 // Point weights of a Gaussian under ~ .6 px spread less than it does: with w = e^(−1/2s) at the
 // next pixel, (2w + 8w⁴)/(1 + 2w + 2w⁴) px² instead of s px². Solved for w.
-fn gaussian(here: Point, i: u32, spacing: vec2f) -> vec4f {
-    let g = settings.gaussians[8u * (here.profile - 1u) + i];
-    let px2 = max(spacing.x * spacing.y, 1e-20);
-    let s = g.w / px2;
+fn lattice_variance(variance_mm2: f32, spacing: f32) -> f32 {
+    let px2 = max(spacing * spacing, 1e-20);
+    let s = variance_mm2 / px2;
     if s > 0.4 || s < 1e-6 {
-        return g;
+        return variance_mm2;
     }
     var w = 0.5 * s / (1.0 - s);
     for (var step = 0; step < 6; step++) {
         let w4 = w * w * w * w;
         w = 0.5 * (s - (8.0 - 2.0 * s) * w4) / (1.0 - s);
     }
-    return vec4f(g.rgb, -0.5 * px2 / log(w));
+    return -0.5 * px2 / log(w);
 }
 
 // Pixels that the Gaussian reaches along a row and over the rows.
@@ -186,11 +188,12 @@ fn fs_rows(vertex: Vertex) -> @location(0) vec4f {
         return vec4f(0.0);
     }
     let spacing = metric(pixel, here).spacing;
-    let variance_mm2 = gaussian(here, vertex.gaussian, spacing).w;
-    let reach = reach(spacing, variance_mm2);
+    let v = gaussian(here, vertex.gaussian).w;
+    let reach = reach(spacing, v);
     if all(reach <= vec2i(SQUARE_REACH)) {
         return vec4f(0.0);
     }
+    let variance_mm2 = lattice_variance(v, spacing.x);
     let first = max(pixel.x - reach.x, 0);
     let last = min(pixel.x + reach.x, size().x - 1);
     var total = vec4f(0.0);
@@ -205,17 +208,23 @@ fn fs_rows(vertex: Vertex) -> @location(0) vec4f {
     return total;
 }
 
-// A small kernel, over its square.
-fn square(pixel: vec2i, here: Point, reach: vec2i, variance_mm2: f32) -> vec4f {
+// A small kernel, over its square; the lattice may be finer along the rows than across.
+fn square(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32) -> vec4f {
+    let along_mm2 = lattice_variance(v, m.spacing.x);
+    let across_mm2 = lattice_variance(v, m.spacing.y);
     let first = max(pixel - reach, vec2i(0));
     let last = min(pixel + reach, size() - 1);
     var total = vec4f(0.0);
     for (var y = first.y; y <= last.y; y++) {
         for (var x = first.x; x <= last.x; x++) {
-            let there = point(vec2i(x, y));
+            let q = vec2i(x, y);
+            let there = point(q);
             if there.profile == here.profile {
-                let w = weight(distance2(there.mm, here.mm), variance_mm2);
-                total += w * textureLoad(source, vec2i(x, y), 0);
+                let d2 = distance2(there.mm, here.mm);
+                let delta = f32(x - pixel.x) + m.shear * f32(y - pixel.y);
+                let along2 = min(m.m00 * delta * delta, d2);
+                let w = weight(along2, along_mm2) * weight(d2 - along2, across_mm2);
+                total += w * textureLoad(source, q, 0);
             }
         }
     }
@@ -238,11 +247,12 @@ fn row_at(q: vec2i, delta: f32, here: Point, m: Metric, variance_mm2: f32) -> ve
 
 // Second pass: over the rows along the sheared step (−κ, 1), which completes the square
 // M₀₀(dx + κ dy)² + (M₁₁ − κ²M₀₀)dy². Sheared taps fall between two pixels.
-fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, variance_mm2: f32) -> vec4f {
+fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32) -> vec4f {
+    let variance_mm2 = lattice_variance(v, m.spacing.y);
     let first = max(pixel.y - reach.y, 0);
     let last = min(pixel.y + reach.y, size().y - 1);
     var total = vec4f(0.0);
-    if variance_mm2 > WIDE_PX2 * m.m00 {
+    if v > WIDE_PX2 * m.m00 {
         // The nearer pixel will do: it rounds alike on both sides, so that it shifts nothing.
         for (var y = first; y <= last; y++) {
             let dx = -m.shear * f32(y - pixel.y);
@@ -278,14 +288,14 @@ fn fs_sum(vertex: Vertex) -> @location(0) vec4f {
         before = textureLoad(sum, pixel, 0).rgb;
     }
     let m = metric(pixel, here);
-    let g = gaussian(here, vertex.gaussian, m.spacing);
+    let g = gaussian(here, vertex.gaussian);
     if all(g.rgb == vec3f(0.0)) {
         return vec4f(before, 1.0);
     }
     let reach = reach(m.spacing, g.w);
     var total: vec4f;
     if all(reach <= vec2i(SQUARE_REACH)) {
-        total = square(pixel, here, reach, g.w);
+        total = square(pixel, here, m, reach, g.w);
     } else {
         total = sheared_rows(pixel, here, m, reach, g.w);
     }
@@ -302,16 +312,18 @@ fn fs_resolve(vertex: Vertex) -> @location(0) vec4f {
     }
     for (var ring = 1; ring <= settings.gutter; ring++) {
         var total = vec4f(0.0);
+        var count = 0.0;
         for (var y = -ring; y <= ring; y++) {
             for (var x = -ring; x <= ring; x++) {
                 let q = pixel + vec2i(x, y);
                 if max(abs(x), abs(y)) == ring && point_or_none(q).profile != 0u {
-                    total += vec4f(textureLoad(sum, q, 0).rgb, 1.0);
+                    total += vec4f(textureLoad(sum, q, 0).rgb, textureLoad(irradiance, q, 0).a);
+                    count += 1.0;
                 }
             }
         }
-        if total.a > 0.0 {
-            return vec4f(total.rgb / total.a, before.a);
+        if count > 0.0 {
+            return total / count;
         }
     }
     return before;

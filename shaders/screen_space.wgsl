@@ -6,7 +6,6 @@ struct Settings {
     // Normalised device coordinates to view space, in mm.
     inverse_projection: mat4x4f,
     profiles: u32,
-    pad: vec3u,
 }
 
 @group(0) @binding(0) var<uniform> settings: Settings;

@@ -15,11 +15,7 @@ pub struct Error {
 
 impl Error {
     /// An error from its three parts.
-    pub fn new(
-        input: impl Into<String>,
-        got: impl Into<String>,
-        needs: impl Into<String>,
-    ) -> Self {
+    pub fn new(input: impl Into<String>, got: impl Into<String>, needs: impl Into<String>) -> Self {
         Self {
             input: input.into(),
             got: got.into(),

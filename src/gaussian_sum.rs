@@ -100,9 +100,17 @@ pub(crate) struct Inputs<'a> {
 
 impl GaussianSum {
     pub fn new(device: &Device, output_format: TextureFormat, label: &'static str) -> Self {
-        let shader = device.create_shader_module(wgpu::include_wgsl!("../shaders/gaussian_sum.wgsl"));
+        let shader =
+            device.create_shader_module(wgpu::include_wgsl!("../shaders/gaussian_sum.wgsl"));
         let pass = |name: &str, textures: &[u32], format| {
-            Pass::new(device, &shader, &format!("{label} {name}"), name, textures, format)
+            Pass::new(
+                device,
+                &shader,
+                &format!("{label} {name}"),
+                name,
+                textures,
+                format,
+            )
         };
         Self {
             label,
@@ -207,7 +215,10 @@ pub(crate) fn scratch_view(device: &Device, label: &str, size: [u32; 2]) -> Text
 
 /// A texture that shaders load floats from; depth formats are floats, too.
 pub(crate) fn float_texture(binding: u32) -> wgpu::BindGroupLayoutEntry {
-    texture(binding, wgpu::TextureSampleType::Float { filterable: false })
+    texture(
+        binding,
+        wgpu::TextureSampleType::Float { filterable: false },
+    )
 }
 
 /// A texture that shaders load unsigned integers from.
@@ -351,5 +362,25 @@ impl Pass {
 
     fn draw(&self, encoder: &mut CommandEncoder, group: &BindGroup, to: &TextureView, i: u32) {
         draw_full_screen(encoder, &self.label, &self.pipeline, group, to, i);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wgsl::assert_layout;
+
+    #[test]
+    fn settings_lie_as_the_shader_has_them() {
+        assert_layout!(
+            include_str!("../shaders/gaussian_sum.wgsl"),
+            "Settings",
+            Settings {
+                gaussians,
+                spacing,
+                mm_per_unit,
+                gutter
+            }
+        );
     }
 }

@@ -29,7 +29,10 @@ pub(crate) fn check_texture(
     let kind = format.sample_type(None, None);
     let float = matches!(kind, Some(TextureSampleType::Float { .. }));
     let (format_fits, format_needs) = match role {
-        Role::Color => (float && format.components() == 4, "four float channels".into()),
+        Role::Color => (
+            float && format.components() == 4,
+            "four float channels".into(),
+        ),
         Role::Depth => (
             format.has_depth_aspect() || (float && format.components() == 1),
             "a depth format or one float channel".into(),
@@ -130,7 +133,11 @@ pub(crate) fn check_output_format(
         Some(TextureSampleType::Float { .. })
     );
     let features = format.guaranteed_format_features(device.features());
-    if !float || !features.allowed_usages.contains(TextureUsages::RENDER_ATTACHMENT) {
+    if !float
+        || !features
+            .allowed_usages
+            .contains(TextureUsages::RENDER_ATTACHMENT)
+    {
         return Err(Error::new(
             "output_format",
             format!("{format:?}"),

@@ -8,6 +8,8 @@ mod profile;
 pub mod renderer;
 mod screen_space;
 mod texture_space;
+#[cfg(test)]
+mod wgsl;
 
 pub use error::Error;
 pub use profile::{Gaussian, Profile};

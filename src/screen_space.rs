@@ -59,7 +59,7 @@ pub struct ScreenSpace {
 struct Settings {
     inverse_projection: Mat4,
     profiles: u32,
-    pad: [u32; 7],
+    pad: [u32; 3],
 }
 
 impl ScreenSpace {
@@ -119,7 +119,12 @@ impl ScreenSpace {
         input::check_texture("irradiance", frame.irradiance, Role::Color, size)?;
         input::check_texture("depth", frame.depth, Role::Depth, size)?;
         input::check_texture("profile_id", frame.profile_id, Role::Id, size)?;
-        input::check_texture("output", frame.output, Role::Target(self.output_format), size)?;
+        input::check_texture(
+            "output",
+            frame.output,
+            Role::Target(self.output_format),
+            size,
+        )?;
         input::check_apart(
             frame.output,
             &[
@@ -138,7 +143,7 @@ impl ScreenSpace {
             bytemuck::bytes_of(&Settings {
                 inverse_projection,
                 profiles: frame.profiles.len() as u32,
-                pad: [0; 7],
+                pad: [0; 3],
             }),
         );
         let positions = match self.positions.take() {
@@ -220,5 +225,28 @@ fn spacing(projection: Mat4, size: [u32; 2], mm_per_unit: f32) -> Vec4 {
     let w = projection.row(3);
     let x = 2.0 / (size[0] as f32 * projection.x_axis.x);
     let y = 2.0 / (size[1] as f32 * projection.y_axis.y);
-    Vec4::new(x * w.w * mm_per_unit, x * w.z, y * w.w * mm_per_unit, y * w.z)
+    Vec4::new(
+        x * w.w * mm_per_unit,
+        x * w.z,
+        y * w.w * mm_per_unit,
+        y * w.z,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wgsl::assert_layout;
+
+    #[test]
+    fn settings_lie_as_the_shader_has_them() {
+        assert_layout!(
+            include_str!("../shaders/screen_space.wgsl"),
+            "Settings",
+            Settings {
+                inverse_projection,
+                profiles
+            }
+        );
+    }
 }

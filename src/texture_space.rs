@@ -72,7 +72,12 @@ impl TextureSpace {
         let size = input::size(atlas.irradiance);
         input::check_texture("irradiance", atlas.irradiance, Role::Color, size)?;
         input::check_texture("positions", atlas.positions, Role::Color, size)?;
-        input::check_texture("output", atlas.output, Role::Target(self.output_format), size)?;
+        input::check_texture(
+            "output",
+            atlas.output,
+            Role::Target(self.output_format),
+            size,
+        )?;
         input::check_apart(
             atlas.output,
             &[

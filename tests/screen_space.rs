@@ -38,8 +38,12 @@ fn constant_irradiance_stays_constant() {
     for format in [TextureFormat::Rgba32Float, TextureFormat::Rgba16Float] {
         let out = g.scatter_all(&[Profile::SKIN], format);
         for (i, _) in g.pixels(|_| true) {
-            let error = DVec3::from_slice(&out[i][..3].iter().map(|&c| c.into()).collect::<Vec<_>>()) - e;
-            assert!(error.abs().max_element() <= 0.001, "{format:?} pixel {i}: {error}");
+            let error =
+                DVec3::from_slice(&out[i][..3].iter().map(|&c| c.into()).collect::<Vec<_>>()) - e;
+            assert!(
+                error.abs().max_element() <= 0.001,
+                "{format:?} pixel {i}: {error}"
+            );
         }
     }
 }
@@ -79,7 +83,10 @@ fn blurred_edges_match_the_closed_form() {
                 worst = worst.max((out[i] - truth).abs().max_element());
             }
             println!("{px_per_mm} px/mm, {angle}°: max error {worst:.5}");
-            assert!(worst <= STEP, "{px_per_mm} px/mm, {angle}°: max error {worst}");
+            assert!(
+                worst <= STEP,
+                "{px_per_mm} px/mm, {angle}°: max error {worst}"
+            );
         }
     }
 }
@@ -97,10 +104,17 @@ fn hard_edges_match_the_visible_sum() {
             let near_edge = |h: &Hit| h.point.dot(across).abs() < 3.0 / px_per_mm;
             let mut worst: f64 = 0.0;
             for (i, _) in g.pixels(near_edge).into_iter().step_by(37) {
-                worst = worst.max((out[i] - g.visible_sum(i, &Profile::SKIN)).abs().max_element());
+                worst = worst.max(
+                    (out[i] - g.visible_sum(i, &Profile::SKIN))
+                        .abs()
+                        .max_element(),
+                );
             }
             println!("{px_per_mm} px/mm, {angle}°: max error {worst:.5}");
-            assert!(worst <= STEP, "{px_per_mm} px/mm, {angle}°: max error {worst}");
+            assert!(
+                worst <= STEP,
+                "{px_per_mm} px/mm, {angle}°: max error {worst}"
+            );
         }
     }
 }
@@ -136,11 +150,14 @@ fn slopes_match_the_closed_form() {
             let inside = inside(&view, px_per_mm);
             // Where scattering does something.
             let pixels = g.pixels(|h| inside(h) && place(h).abs() < 6.0);
-            let error = rms(pixels.iter().map(|(i, h)| {
-                out[*i].x - scattered_step(place(h), blur_mm2, &Profile::SKIN).x
-            }));
+            let error = rms(pixels
+                .iter()
+                .map(|(i, h)| out[*i].x - scattered_step(place(h), blur_mm2, &Profile::SKIN).x));
             println!("tilt {tilt}° about {axis}°, edge at {edge}°: red RMS {error:.5}");
-            assert!(error <= 0.004, "tilt {tilt}° about {axis}°, edge {edge}°: {error}");
+            assert!(
+                error <= 0.004,
+                "tilt {tilt}° about {axis}°, edge {edge}°: {error}"
+            );
         }
     }
 }
@@ -164,10 +181,13 @@ fn a_sphere_matches_eq_7() {
                 .map(|(i, h)| out[*i].x - truth(h.normal.dot(light)).x))
         };
         let (whole, interior) = (error(&|_| true), error(&|h| h.normal.z > 0.35));
-        let none = rms(g.pixels(|_| true).iter().map(|(_, h)| {
-            h.irradiance.x - truth(h.normal.dot(light)).x
-        }));
-        println!("{px_per_mm} px/mm: red RMS {whole:.5}, n_z > .35 {interior:.5}, unscattered {none:.5}");
+        let none = rms(g
+            .pixels(|_| true)
+            .iter()
+            .map(|(_, h)| h.irradiance.x - truth(h.normal.dot(light)).x));
+        println!(
+            "{px_per_mm} px/mm: red RMS {whole:.5}, n_z > .35 {interior:.5}, unscattered {none:.5}"
+        );
         // What the hidden half contributes, .0060, no screen-space method can know.
         assert!(whole <= 0.012, "whole sphere: {whole}");
         assert!(interior <= 0.003, "interior: {interior}");
@@ -189,7 +209,10 @@ fn a_sphere_matches_the_visible_sum() {
         .collect();
     let red = rms(errors.iter().map(|e| e.x));
     let blue = rms(errors.iter().map(|e| e.z));
-    println!("red RMS {red:.5}, blue RMS {blue:.5} over {} pixels", pixels.len());
+    println!(
+        "red RMS {red:.5}, blue RMS {blue:.5} over {} pixels",
+        pixels.len()
+    );
     // Two passes over a curved surface are not the full sum; .7 % is what a face shows
     // (numerics: .1 to .7 % of the visible integral).
     assert!(red <= 0.007 && blue <= 0.003, "red {red}, blue {blue}");
@@ -197,39 +220,63 @@ fn a_sphere_matches_the_visible_sum() {
 
 #[test]
 fn layers_leak_what_the_visible_sum_says() {
-    for (gap_mm, angle) in [2.0, 5.0, 10.0].into_iter().flat_map(|gap| [0.0, 90.0, 20.0, 45.0].map(|a| (gap, a))) {
-        let px_per_mm = 4.0;
-        let view = View::orthographic([256, 256], px_per_mm);
-        let across = direction(angle);
-        // The nearer layer, dark, hides half of a lit one.
-        let near = plane(DVec3::Z, 300.0 - gap_mm, |_| DVec3::ZERO);
-        let far = plane(DVec3::Z, 300.0, |_| DVec3::ONE);
-        let g = view.shoot(|origin, ray| {
-            let hit = near(origin, ray)?;
-            if hit.point.dot(across) < 0.0 { Some(hit) } else { far(origin, ray) }
-        });
-        let out = g.scatter(&Profile::SKIN);
-        let pixels: Vec<_> = g
-            .pixels(|h| h.point.dot(across).abs() < 6.0 && h.point.truncate().length() < 20.0)
-            .into_iter()
-            .step_by(97)
-            .collect();
-        let mut worst: f64 = 0.0;
-        let mut leak: f64 = 0.0;
-        for (i, hit) in &pixels {
-            worst = worst.max((out[*i] - g.visible_sum(*i, &Profile::SKIN)).abs().max_element());
-            if hit.irradiance == DVec3::ZERO {
-                leak = leak.max(out[*i].max_element());
+    for gap_mm in [2.0, 5.0, 10.0] {
+        for angle in [0.0, 90.0, 20.0, 45.0] {
+            let view = View::orthographic([256, 256], 4.0);
+            let across = direction(angle);
+            // The nearer layer, dark, hides half of a lit one.
+            let near = plane(DVec3::Z, 300.0 - gap_mm, |_| DVec3::ZERO);
+            let far = plane(DVec3::Z, 300.0, |_| DVec3::ONE);
+            let g = view.shoot(|origin, ray| {
+                near(origin, ray)
+                    .filter(|hit| hit.point.dot(across) < 0.0)
+                    .or_else(|| far(origin, ray))
+            });
+            let out = g.scatter(&Profile::SKIN);
+            let pixels: Vec<_> = g
+                .pixels(|h| h.point.dot(across).abs() < 6.0 && h.point.truncate().length() < 20.0)
+                .into_iter()
+                .step_by(97)
+                .collect();
+            let mut worst: f64 = 0.0;
+            let mut leak: f64 = 0.0;
+            for (i, hit) in &pixels {
+                let truth = g.visible_sum(*i, &Profile::SKIN);
+                worst = worst.max((out[*i] - truth).abs().max_element());
+                if hit.irradiance == DVec3::ZERO {
+                    leak = leak.max(out[*i].max_element());
+                }
             }
+            println!("{gap_mm} mm, edge at {angle}°: max error {worst:.5}, leak {leak:.5}");
+            // An edge along the rows or columns keeps every pass within one layer or crosses it
+            // once. A slanted one makes the second pass cross twice, which weighs the gap twice:
+            // a limit of two passes (docs/method.md), held here so that it grows no further.
+            let slanted = angle % 90.0 != 0.0;
+            let limit = if !slanted || gap_mm >= 10.0 {
+                0.002
+            } else if gap_mm >= 5.0 {
+                0.006
+            } else {
+                0.035
+            };
+            assert!(
+                worst <= limit,
+                "{gap_mm} mm, {angle}°: {worst} from the visible sum"
+            );
+            assert!(
+                gap_mm < 10.0 || leak <= 0.0005,
+                "{gap_mm} mm, {angle}°: leak {leak}"
+            );
         }
-        println!("{gap_mm} mm, edge at {angle}°: max error {worst:.5}, leak {leak:.5}");
     }
 }
 
 /// Distance in mm between a quarter and three quarters of a vertical edge's height.
 fn edge_width_mm(view: View) -> f64 {
     let blur_mm2 = 0.3;
-    let g = view.shoot(plane(DVec3::Z, 120.0, |p| DVec3::splat(step(p.x, blur_mm2))));
+    let g = view.shoot(plane(DVec3::Z, 120.0, |p| {
+        DVec3::splat(step(p.x, blur_mm2))
+    }));
     let out = g.scatter(&single_gaussian(1.0));
     let row = (view.size[1] / 2 * view.size[0]) as usize;
     let crossing = |level: f64| {
@@ -259,7 +306,10 @@ fn width_is_in_millimetres() {
     ] {
         let width = edge_width_mm(view);
         println!("{name}: {width:.4} mm, truth {truth:.4} mm");
-        assert!((width / truth - 1.0).abs() <= 0.01, "{name}: {width} mm instead of {truth} mm");
+        assert!(
+            (width / truth - 1.0).abs() <= 0.01,
+            "{name}: {width} mm instead of {truth} mm"
+        );
     }
 }
 
@@ -272,7 +322,10 @@ fn every_kind_of_depth_gives_the_same() {
         let mut p = reversed.projection;
         p.z_axis.z = z;
         p.w_axis.z = offset;
-        View { projection: p, ..reversed }
+        View {
+            projection: p,
+            ..reversed
+        }
     };
     let light = DVec3::new(0.7, 0.2, 0.7).normalize();
     let scene = |view: View| {
@@ -307,16 +360,28 @@ fn an_off_centre_projection_gives_the_same() {
         DVec4::new(-1.0, 0.0, 0.0, 1.0),
     ) * whole.projection;
     projection.x_axis.y = 0.0;
-    let half = View { size: [200, 200], projection };
+    let half = View {
+        size: [200, 200],
+        projection,
+    };
     let scene = |view: View| {
-        view.shoot(sphere(6.0, 80.0, |n| DVec3::splat((20.0 * n.y).sin() + 1.0)))
+        view.shoot(sphere(6.0, 80.0, |n| {
+            DVec3::splat((20.0 * n.y).sin() + 1.0)
+        }))
     };
     // Only where the half's own edge cuts no kernel.
-    let (all, part) = (scene(whole).scatter(&Profile::SKIN), scene(half).scatter(&Profile::SKIN));
+    let (all, part) = (
+        scene(whole).scatter(&Profile::SKIN),
+        scene(half).scatter(&Profile::SKIN),
+    );
     let mut worst: f64 = 0.0;
     for y in 0..200 {
         for x in 120..200 {
-            worst = worst.max((all[y * 400 + 200 + x] - part[y * 200 + x]).abs().max_element());
+            worst = worst.max(
+                (all[y * 400 + 200 + x] - part[y * 200 + x])
+                    .abs()
+                    .max_element(),
+            );
         }
     }
     println!("differs by {worst:.6}");
@@ -340,7 +405,10 @@ fn other_pixels_stay_bit_for_bit() {
             skin_changed += u32::from(out[0] != e.x);
             assert_eq!(out[3], 0.5, "alpha is kept");
         } else {
-            assert_eq!(out.map(f32::to_bits), [e.x, e.y, e.z, 0.5].map(f32::to_bits));
+            assert_eq!(
+                out.map(f32::to_bits),
+                [e.x, e.y, e.z, 0.5].map(f32::to_bits)
+            );
         }
     }
     assert!(skin_changed > 1000, "the skin itself scatters");
@@ -357,11 +425,14 @@ fn profiles_do_not_mix() {
         hit.id = 1 + side as u32;
         Some(hit)
     });
-    let out = g.scatter_all(&[Profile::SKIN, single_gaussian(4.0)], TextureFormat::Rgba32Float);
+    let out = g.scatter_all(
+        &[Profile::SKIN, single_gaussian(4.0)],
+        TextureFormat::Rgba32Float,
+    );
     for (i, hit) in g.pixels(|_| true) {
-        for c in 0..3 {
+        for (found, before) in out[i].iter().zip(hit.irradiance.to_array()) {
             // Sums of equal terms: rounding only.
-            assert!((f64::from(out[i][c]) - hit.irradiance[c]).abs() < 1e-5);
+            assert!((f64::from(*found) - before).abs() < 1e-5);
         }
     }
 }

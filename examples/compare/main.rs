@@ -27,8 +27,9 @@ use report::{DIFFERENCE_GAIN, ModeReport, Report};
 /// The built-in head: made from the MakeHuman base mesh (CC0) by make_head.py.
 const HEAD: &[u8] = include_bytes!("head.glb");
 
-/// Runs that a median is taken of.
+/// Runs that a median is taken of: this many, or as many as fit into this time.
 const TIMED_RUNS: usize = 5;
+const TIMED_SECONDS: f64 = 10.0;
 
 /// Gaussians narrower than this, in texels, are lost in an atlas.
 const RESOLVED_TEXELS: f32 = 0.6;
@@ -90,7 +91,11 @@ fn options() -> Result<Option<Options>, Error> {
     };
     let mut parser = lexopt::Parser::from_env();
     let refused = |e: lexopt::Error| {
-        Error::new("command line", format!("\"{e}\""), "options as --help lists them")
+        Error::new(
+            "command line",
+            format!("\"{e}\""),
+            "options as --help lists them",
+        )
     };
     while let Some(arg) = parser.next().map_err(refused)? {
         let Long(name) = &arg else {
@@ -126,7 +131,11 @@ fn options() -> Result<Option<Options>, Error> {
                     .parse()
                     .map_err(|_| Error::new("--texture-size", text, "a whole number of texels"))?;
             }
-            _ => return Err(refused(lexopt::Error::UnexpectedOption(format!("--{name}")))),
+            _ => {
+                return Err(refused(lexopt::Error::UnexpectedOption(format!(
+                    "--{name}"
+                ))));
+            }
         }
     }
     Ok(Some(options))
@@ -159,6 +168,8 @@ struct Scattered {
     name: &'static str,
     title: &'static str,
     view: wgpu::TextureView,
+    runs: usize,
+    /// Median over the runs.
     ms: f64,
     atlas: Option<AtlasTimes>,
 }
@@ -194,6 +205,7 @@ fn compare(options: &Options) -> Result<(), Error> {
         name: "none",
         title: "no scattering",
         view: renderer.gbuffer.irradiance.clone(),
+        runs: 0,
         ms: 0.0,
         atlas: None,
     };
@@ -211,16 +223,25 @@ fn compare(options: &Options) -> Result<(), Error> {
     step("measuring");
     let frame = Frame::read(&gpu, &renderer, &camera, options);
     let mm_per_texel = mm_per_texel(&scene, options);
-    let finest = mm_per_texel.iter().map(|(_, mm)| *mm).fold(f32::INFINITY, f32::min);
+    let finest = mm_per_texel
+        .iter()
+        .map(|(_, mm)| *mm)
+        .fold(f32::INFINITY, f32::min);
     let coarsest = mm_per_texel.iter().map(|(_, mm)| *mm).fold(0.0, f32::max);
     let measured = measure(&gpu, &renderer, &frame, &modes, options);
+    let runs: Vec<_> = modes
+        .iter()
+        .filter(|m| m.runs > 0)
+        .map(|m| format!("{} of {}", m.title, m.runs))
+        .collect();
     let mut notes = vec![format!(
-        "Timings are medians of {TIMED_RUNS} runs, submit and wait; on a software driver they \
-         compare the modes with each other, not with a GPU."
+        "Timings are medians of runs, submit and wait ({}); on a software driver they compare \
+         the modes with each other, not with a GPU.",
+        runs.join(", ")
     )];
     if finest < coarsest {
         notes.push(format!(
-            "The atlas pages differ: {finest:.3} to {coarsest:.3} mm a texel; the coarsest is given."
+            "The primitives differ: {finest:.3} to {coarsest:.3} mm a texel; the coarsest is given."
         ));
     }
     let report = Report {
@@ -247,11 +268,14 @@ fn compare(options: &Options) -> Result<(), Error> {
     };
 
     step("writing the report");
-    let files = files(&report, &measured.layers).map_err(|e| {
-        Error::new("report", format!("\"{e}\""), "pictures that can be encoded")
-    })?;
+    let files = files(&report, &measured.layers)
+        .map_err(|e| Error::new("report", format!("\"{e}\""), "pictures that can be encoded"))?;
     report::write(&options.out, &files).map_err(|e| {
-        Error::new("--out", format!("\"{e}\""), "a directory that can be written to")
+        Error::new(
+            "--out",
+            format!("\"{e}\""),
+            "a directory that can be written to",
+        )
     })?;
     progress.finish_and_clear();
     println!("{}", report::table(&report));
@@ -278,7 +302,8 @@ fn scatter_screen(
     let output = renderer.scattered_target(gpu);
     let mut effect = ScreenSpace::new(&gpu.device, output.texture().format())?;
     let mut times = Vec::new();
-    for _ in 0..TIMED_RUNS {
+    let timed = Instant::now();
+    while more_runs(times.len(), timed) {
         let start = Instant::now();
         effect.prepare(
             &gpu.device,
@@ -300,20 +325,18 @@ fn scatter_screen(
         name: "screen_space",
         title: "screen space",
         view: output,
+        runs: times.len(),
         ms: median(&mut times),
         atlas: None,
     })
 }
 
-fn scatter_texture(
-    gpu: &Gpu,
-    renderer: &Renderer,
-    options: &Options,
-) -> Result<Scattered, Error> {
+fn scatter_texture(gpu: &Gpu, renderer: &Renderer, options: &Options) -> Result<Scattered, Error> {
     let output = renderer.scattered_target(gpu);
     let mut atlas = AtlasRenderer::new(gpu, renderer, options.texture_size)?;
     let (mut raster, mut blur, mut both) = (Vec::new(), Vec::new(), Vec::new());
-    for _ in 0..TIMED_RUNS {
+    let timed = Instant::now();
+    while more_runs(both.len(), timed) {
         let times = atlas.render(
             gpu,
             renderer,
@@ -329,12 +352,17 @@ fn scatter_texture(
         name: "texture_space",
         title: "texture space",
         view: output,
+        runs: both.len(),
         ms: median(&mut both),
         atlas: Some(AtlasTimes {
             raster_ms: median(&mut raster),
             blur_ms: median(&mut blur),
         }),
     })
+}
+
+fn more_runs(done: usize, since: Instant) -> bool {
+    done == 0 || (done < TIMED_RUNS && since.elapsed().as_secs_f64() < TIMED_SECONDS)
 }
 
 fn median(values: &mut [f64]) -> f64 {
@@ -359,7 +387,11 @@ impl Frame {
             .map(|id| *id != 0)
             .collect();
         let depth: Vec<f32> = bytemuck::pod_collect_to_vec(&gpu.read_bytes(g.depth.texture()));
-        let inverse = camera.projection(options.size).as_dmat4().inverse().as_mat4();
+        let inverse = camera
+            .projection(options.size)
+            .as_dmat4()
+            .inverse()
+            .as_mat4();
         let area = depth
             .iter()
             .zip(gpu.read(&g.normal))
@@ -388,18 +420,18 @@ fn area(i: usize, depth: f32, normal: [f32; 4], inverse: Mat4, size: [u32; 2]) -
     f64::from(p.z.abs().powi(3) / (facing.max(0.1) * p.length()))
 }
 
-/// Width of a texel on the skin in mm, for each primitive that scatters.
+/// Width of a texel on the skin in mm, for each primitive that scatters, on its fullest page.
 fn mm_per_texel(scene: &Scene, options: &Options) -> Vec<(String, f32)> {
     scene
         .primitives
         .iter()
         .filter(|p| scene.materials[p.material].profile_id != 0)
-        .filter_map(|p| {
-            let widest = (0..p.pages.len())
-                .map(|page| p.texel_size(page, options.texture_size) * options.mm_per_unit)
-                .fold(0.0, f32::max);
-            (widest > 0.0).then(|| (p.name.clone(), widest))
+        .map(|p| {
+            let page = (0..p.pages.len()).max_by_key(|i| p.pages[*i].len());
+            let texel = page.map_or(0.0, |page| p.texel_size(page, options.texture_size));
+            (p.name.clone(), texel * options.mm_per_unit)
         })
+        .filter(|(_, mm)| *mm > 0.0)
         .collect()
 }
 
@@ -440,7 +472,14 @@ fn measure(
     };
     let irradiance: Vec<Layer> = modes
         .iter()
-        .map(|m| layer(gpu.read(&m.view).iter().map(|p| [p[0], p[1], p[2]]).collect()))
+        .map(|m| {
+            layer(
+                gpu.read(&m.view)
+                    .iter()
+                    .map(|p| [p[0], p[1], p[2]])
+                    .collect(),
+            )
+        })
         .collect();
     let radiance: Vec<Layer> = irradiance
         .iter()
@@ -487,9 +526,9 @@ fn measure(
             ms_blur: mode.atlas.map(|t| t.blur_ms),
             rel_rmse: reference
                 .and_then(|r| metrics::relative_rmse(&irradiance[i], &irradiance[r], &inner)),
-            rel_rmse_scattered: reference.zip(scattered.as_ref()).and_then(|(r, mask)| {
-                metrics::relative_rmse(&irradiance[i], &irradiance[r], mask)
-            }),
+            rel_rmse_scattered: reference
+                .zip(scattered.as_ref())
+                .and_then(|(r, mask)| metrics::relative_rmse(&irradiance[i], &irradiance[r], mask)),
             max_error: reference
                 .and_then(|r| metrics::max_error(&irradiance[i], &irradiance[r], &inner)),
             delta_e2000_p99: reference.and_then(|r| {

@@ -907,7 +907,7 @@ MATERIALS = [
     {
         "name": "skin",
         "pbrMetallicRoughness": {
-            "baseColorFactor": [0.80, 0.57, 0.45, 1.0],
+            "baseColorFactor": [0.70, 0.47, 0.36, 1.0],
             "metallicFactor": 0.0,
             "roughnessFactor": 0.5,
         },

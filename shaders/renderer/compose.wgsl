@@ -7,7 +7,6 @@ struct Compose {
     exposure: f32,
     // 1: the diffuse layer alone, without albedo.
     layer: u32,
-    pad: vec2u,
 }
 
 @group(0) @binding(0) var<uniform> compose: Compose;

@@ -35,7 +35,6 @@ struct Lighting {
     f0: f32,
     // Of skin: Beckmann's RMS slope m.
     slope: f32,
-    pad: vec2u,
 }
 
 @group(2) @binding(0) var<uniform> lighting: Lighting;

@@ -19,7 +19,6 @@ struct Material {
     slope: f32,
     profile_id: u32,
     procedural: u32,
-    pad: vec3u,
 }
 
 @group(0) @binding(0) var<uniform> camera: Camera;
@@ -110,7 +109,7 @@ fn freckles(mm: vec3f, cell_mm: f32) -> f32 {
         let radius = 0.10 + 0.22 * h.z * h.z;
         let center = vec3f(cell) + 0.25 + 0.5 * hash(cell + 1031);
         let d = distance(p, center) / radius;
-        dark = max(dark, (1.0 - smoothstep(0.4, 1.0, d)) * step(0.62, h.x) * (0.4 + 0.6 * h.y));
+        dark = max(dark, (1.0 - smoothstep(0.4, 1.0, d)) * step(0.45, h.x) * (0.4 + 0.6 * h.y));
     }
     return dark;
 }
@@ -122,7 +121,7 @@ fn procedural_skin(mm: vec3f, mask: vec4f, base: vec3f, footprint: f32) -> vec3f
     // Blood under thin skin takes green and blue.
     let redness = mask.y * (0.75 + 0.5 * blotch);
     color *= mix(vec3f(1.0), vec3f(0.96, 0.73, 0.72), redness);
-    let spots = freckles(mm, 3.4) * resolved(0.9, footprint) * smoothstep(0.15, 0.75, mask.y);
+    let spots = freckles(mm, 3.4) * resolved(0.9, footprint) * smoothstep(0.05, 0.6, mask.y);
     color *= mix(vec3f(1.0), vec3f(0.74, 0.56, 0.46), 0.55 * spots * (1.0 - mask.x));
     let lips = base * vec3f(0.80, 0.47, 0.50) * (1.0 + 0.25 * blotch);
     color = mix(color, lips, mask.x);

@@ -24,9 +24,9 @@ pub struct Camera {
 pub enum View {
     /// From the front.
     Front,
-    /// Turned by 40°.
+    /// From 40° to the right of the person, where the default key light is.
     ThreeQuarter,
-    /// From the side.
+    /// From the person's right side.
     Profile,
     /// The middle of the face.
     CloseUp,
@@ -57,12 +57,16 @@ impl Camera {
         let extent = max - min;
         let bust = extent.x > 0.9 * extent.y;
         let head = if bust { 0.78 * extent.y } else { extent.y };
-        let middle = Vec3::new(0.5 * (min.x + max.x), max.y - 0.5 * head, 0.5 * (min.z + max.z));
+        let middle = Vec3::new(
+            0.5 * (min.x + max.x),
+            max.y - 0.5 * head,
+            0.5 * (min.z + max.z),
+        );
         let fov_y = 24f32.to_radians();
         let (yaw, target, height) = match view {
             View::Front => (0.0, middle, head),
-            View::ThreeQuarter => (40.0, middle, head),
-            View::Profile => (90.0, middle, head),
+            View::ThreeQuarter => (-40.0, middle, head),
+            View::Profile => (-90.0, middle, head),
             View::CloseUp => (20.0, nose(scene, min.y + 0.35 * extent.y), 0.26 * extent.y),
         };
         // Upright frames need the distance that the width asks for.

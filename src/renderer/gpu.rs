@@ -31,8 +31,9 @@ impl Gpu {
                     "a Vulkan, Metal or DirectX 12 driver; on Linux ./setup installs one",
                 )
             };
-            let instance =
-                wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+            let instance = wgpu::Instance::new(
+                wgpu::InstanceDescriptor::new_without_display_handle_from_env(),
+            );
             let adapter = match wgpu::util::initialize_adapter_from_env(&instance, None).await {
                 Ok(adapter) => adapter,
                 Err(_) => instance
@@ -63,7 +64,12 @@ impl Gpu {
     /// A texture of its own that passes render to and read from, and that can be copied out.
     pub fn target(&self, label: &str, size: [u32; 2], format: TextureFormat) -> TextureView {
         self.device
-            .create_texture(&descriptor(label, size, format, TextureUsages::RENDER_ATTACHMENT))
+            .create_texture(&descriptor(
+                label,
+                size,
+                format,
+                TextureUsages::RENDER_ATTACHMENT,
+            ))
             .create_view(&Default::default())
     }
 

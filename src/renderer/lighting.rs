@@ -143,7 +143,7 @@ impl Default for Lighting {
             sky: Sky::soft(),
             specular: Specular::Kelemen,
             slope: 0.3,
-            intensity: 0.18,
+            intensity: 0.32,
             f0: 0.028,
         }
     }
@@ -413,6 +413,37 @@ impl Lights {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wgsl::assert_layout;
+
+    #[test]
+    fn lights_lie_as_the_shader_has_them() {
+        let shader = include_str!("../../shaders/renderer/lighting.wgsl");
+        assert_layout!(
+            shader,
+            "Light",
+            LightUniform {
+                direction,
+                tan_radius,
+                color,
+                pad,
+                to_map
+            }
+        );
+        assert_layout!(
+            shader,
+            "Lighting",
+            LightingUniform {
+                lights,
+                sky,
+                map_extent,
+                count,
+                specular_model,
+                specular_intensity,
+                f0,
+                slope
+            }
+        );
+    }
 
     #[test]
     fn a_uniform_sky_lights_every_side_alike() {

@@ -18,7 +18,7 @@ pub(super) struct MaterialUniform {
     slope: f32,
     profile_id: u32,
     procedural: u32,
-    pad: [u32; 7],
+    pad: [u32; 3],
 }
 
 /// One primitive, ready to be drawn.
@@ -113,7 +113,7 @@ impl Mesh {
                     slope: (material.roughness * material.roughness).max(0.02),
                     profile_id: material.profile_id.into(),
                     procedural: primitive.procedural.into(),
-                    pad: [0; 7],
+                    pad: [0; 3],
                 };
                 let color = texture(
                     material.base_color_texture,
@@ -232,5 +232,45 @@ fn half(image: &Image) -> Image {
         width,
         height,
         rgba8,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wgsl::assert_layout;
+
+    const SHADER: &str = include_str!("../../shaders/renderer/material.wgsl");
+
+    #[test]
+    fn materials_lie_as_the_shader_has_them() {
+        assert_layout!(
+            SHADER,
+            "Material",
+            MaterialUniform {
+                base_color,
+                normal_scale,
+                alpha_cutoff,
+                slope,
+                profile_id,
+                procedural
+            }
+        );
+    }
+
+    #[test]
+    fn cameras_lie_as_the_shader_has_them() {
+        use crate::renderer::CameraUniform;
+        assert_layout!(
+            SHADER,
+            "Camera",
+            CameraUniform {
+                view,
+                view_projection,
+                inverse_view_projection,
+                eye,
+                mm_per_unit
+            }
+        );
     }
 }

@@ -73,7 +73,6 @@ pub struct Renderer {
     shade: wgpu::RenderPipeline,
     shade_group: wgpu::BindGroup,
     compose: wgpu::RenderPipeline,
-    compose_layout: wgpu::BindGroupLayout,
 }
 
 /// `Camera` of the shaders.
@@ -93,7 +92,6 @@ struct CameraUniform {
 struct ComposeUniform {
     exposure: f32,
     layer: u32,
-    pad: [u32; 2],
 }
 
 impl Renderer {
@@ -231,7 +229,6 @@ impl Renderer {
             shade,
             shade_group,
             compose,
-            compose_layout,
         })
     }
 
@@ -317,7 +314,6 @@ impl Renderer {
             bytemuck::bytes_of(&ComposeUniform {
                 exposure,
                 layer: (layer == Layer::Diffuse).into(),
-                pad: [0; 2],
             }),
         );
         let g = &self.gbuffer;
@@ -493,7 +489,10 @@ fn full_screen_pipeline(
     )
 }
 
-#[expect(clippy::too_many_arguments, reason = "all that two kinds of pipeline differ in")]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "all that two kinds of pipeline differ in"
+)]
 fn pipeline(
     gpu: &Gpu,
     label: &str,
@@ -534,4 +533,19 @@ fn pipeline(
             multiview_mask: None,
             cache: None,
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wgsl::assert_layout;
+
+    #[test]
+    fn compose_lies_as_the_shader_has_it() {
+        assert_layout!(
+            include_str!("../../shaders/renderer/compose.wgsl"),
+            "Compose",
+            ComposeUniform { exposure, layer }
+        );
+    }
 }

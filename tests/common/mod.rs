@@ -338,7 +338,11 @@ pub fn lattice_variance(variance: f64, cell: f64) -> f64 {
     let (mut low, mut high) = (1e-4, 2.0);
     for _ in 0..60 {
         let middle = (low + high) / 2.0;
-        if spread(middle) < wanted { low = middle } else { high = middle }
+        if spread(middle) < wanted {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     low * cell
 }
@@ -362,8 +366,5 @@ pub fn host(projection: DMat4) -> Mat4 {
 /// Rotates the normal (0, 0, 1) by `tilt` about the image axis at `axis`, both in degrees.
 pub fn tilted_normal(tilt: f64, axis: f64) -> DVec3 {
     let axis = axis.to_radians();
-    DMat3::from_axis_angle(
-        DVec3::new(axis.cos(), axis.sin(), 0.0),
-        tilt.to_radians(),
-    ) * DVec3::Z
+    DMat3::from_axis_angle(DVec3::new(axis.cos(), axis.sin(), 0.0), tilt.to_radians()) * DVec3::Z
 }

@@ -1,0 +1,240 @@
+//! Inputs that do not fit are named, never a panic or a validation error of the device.
+
+mod common;
+
+use common::gpu;
+use glam::Mat4;
+use subsurface::wgpu::{self, TextureFormat, TextureUsages, TextureView};
+use subsurface::{Atlas, Error, Profile, ScreenFrame, ScreenSpace, TextureSpace};
+
+const SIZE: [u32; 2] = [16, 8];
+
+fn view(format: TextureFormat) -> TextureView {
+    gpu().target("input", SIZE, format)
+}
+
+fn texture(format: TextureFormat, usage: TextureUsages, samples: u32) -> TextureView {
+    gpu()
+        .device
+        .create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d {
+                width: SIZE[0],
+                height: SIZE[1],
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: samples,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage,
+            view_formats: &[],
+        })
+        .create_view(&Default::default())
+}
+
+/// Prepares a frame in which `change` has changed one thing.
+fn screen(change: impl FnOnce(&mut Inputs)) -> Result<(), Error> {
+    let mut inputs = Inputs {
+        irradiance: view(TextureFormat::Rgba16Float),
+        depth: view(TextureFormat::Depth32Float),
+        profile_id: view(TextureFormat::R8Uint),
+        output: view(TextureFormat::Rgba16Float),
+        projection: common::View::perspective(SIZE, 40.0).projection.as_mat4(),
+        mm_per_unit: 1.0,
+        profiles: vec![Profile::SKIN],
+    };
+    change(&mut inputs);
+    let gpu = gpu();
+    // Whatever gets past the checks must not trip the device's own.
+    let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let mut effect = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float)?;
+    let result = effect.prepare(
+        &gpu.device,
+        &gpu.queue,
+        &ScreenFrame {
+            irradiance: &inputs.irradiance,
+            depth: &inputs.depth,
+            profile_id: &inputs.profile_id,
+            output: &inputs.output,
+            projection: inputs.projection,
+            mm_per_unit: inputs.mm_per_unit,
+            profiles: &inputs.profiles,
+        },
+    );
+    gpu.run(|encoder| effect.render(encoder));
+    let error = pollster(scope.pop());
+    assert!(error.is_none(), "{error:?}");
+    result
+}
+
+struct Inputs {
+    irradiance: TextureView,
+    depth: TextureView,
+    profile_id: TextureView,
+    output: TextureView,
+    projection: Mat4,
+    mm_per_unit: f32,
+    profiles: Vec<Profile>,
+}
+
+/// Validation errors are known at once.
+fn pollster<T>(future: impl Future<Output = T>) -> T {
+    let mut future = std::pin::pin!(future);
+    let mut context = std::task::Context::from_waker(std::task::Waker::noop());
+    match future.as_mut().poll(&mut context) {
+        std::task::Poll::Ready(value) => value,
+        std::task::Poll::Pending => panic!("the error scope is still open"),
+    }
+}
+
+#[test]
+fn what_fits_is_taken() {
+    screen(|_| ()).unwrap();
+    for depth in [
+        TextureFormat::Depth16Unorm,
+        TextureFormat::Depth24Plus,
+        TextureFormat::R32Float,
+    ] {
+        screen(|i| i.depth = view(depth)).unwrap();
+    }
+    screen(|i| i.irradiance = view(TextureFormat::Rgba32Float)).unwrap();
+    screen(|i| i.profile_id = view(TextureFormat::R32Uint)).unwrap();
+    screen(|i| i.profiles = vec![Profile::SKIN; 16]).unwrap();
+}
+
+#[test]
+fn what_does_not_fit_is_named() {
+    let refused = |name: &str, change: fn(&mut Inputs)| {
+        let error = screen(change).expect_err(name).to_string();
+        assert!(error.starts_with(name), "{error}\nshould be about {name}");
+        assert!(error.contains("got") && error.contains("needs"), "{error}");
+    };
+    refused("irradiance: format", |i| {
+        i.irradiance = view(TextureFormat::Rgba8Uint)
+    });
+    refused("irradiance: format", |i| {
+        i.irradiance = view(TextureFormat::R16Float)
+    });
+    refused("depth: format", |i| {
+        i.depth = view(TextureFormat::Rgba16Float)
+    });
+    refused("profile_id: format", |i| {
+        i.profile_id = view(TextureFormat::R8Unorm)
+    });
+    refused("output: format", |i| {
+        i.output = view(TextureFormat::Rgba32Float)
+    });
+    refused("depth: size", |i| {
+        i.depth = gpu().target("small", [8, 8], TextureFormat::Depth32Float);
+    });
+    refused("depth: got D2 with 4 samples", |i| {
+        let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::RENDER_ATTACHMENT;
+        i.depth = texture(TextureFormat::Depth32Float, usage, 4);
+    });
+    refused("irradiance: usage", |i| {
+        i.irradiance = texture(
+            TextureFormat::Rgba16Float,
+            TextureUsages::RENDER_ATTACHMENT,
+            1,
+        );
+    });
+    refused("output: usage", |i| {
+        i.output = texture(
+            TextureFormat::Rgba16Float,
+            TextureUsages::TEXTURE_BINDING,
+            1,
+        );
+    });
+    refused("output: got the texture of irradiance", |i| {
+        i.output = i.irradiance.clone()
+    });
+    refused("projection", |i| i.projection = Mat4::ZERO);
+    refused("projection", |i| i.projection.x_axis.x = f32::NAN);
+    refused("projection", |i| i.projection.x_axis.y = 0.5);
+    for bad in [0.0, -1.0, f32::INFINITY, f32::NAN] {
+        let error = screen(|i| i.mm_per_unit = bad).unwrap_err();
+        assert_eq!(error.input, "mm_per_unit");
+    }
+    refused("profiles", |i| i.profiles.clear());
+    refused("profiles", |i| i.profiles = vec![Profile::SKIN; 17]);
+}
+
+#[test]
+fn an_output_format_that_cannot_be_drawn_to_is_named() {
+    let device = &gpu().device;
+    for format in [
+        TextureFormat::Rgba8Uint,
+        TextureFormat::Depth32Float,
+        TextureFormat::Bc1RgbaUnorm,
+    ] {
+        let error = ScreenSpace::new(device, format).err().expect("refused");
+        assert_eq!(error.input, "output_format");
+        assert!(TextureSpace::new(device, format).is_err());
+    }
+}
+
+#[test]
+fn the_atlas_is_checked_too() {
+    let gpu = gpu();
+    let mut path = TextureSpace::new(&gpu.device, TextureFormat::Rgba16Float).unwrap();
+    let irradiance = view(TextureFormat::Rgba16Float);
+    let output = view(TextureFormat::Rgba16Float);
+    let mut prepare = |positions: &TextureView, output: &TextureView| {
+        path.prepare(
+            &gpu.device,
+            &gpu.queue,
+            &Atlas {
+                irradiance: &irradiance,
+                positions,
+                output,
+                mm_per_unit: 1000.0,
+                profiles: &[Profile::SKIN],
+            },
+        )
+    };
+    let positions = view(TextureFormat::Rgba32Float);
+    prepare(&positions, &output).unwrap();
+    assert_eq!(
+        prepare(&view(TextureFormat::R8Uint), &output)
+            .unwrap_err()
+            .input,
+        "positions: format"
+    );
+    assert_eq!(
+        prepare(&positions, &irradiance).unwrap_err().input,
+        "output"
+    );
+}
+
+#[test]
+fn nothing_is_drawn_before_the_first_frame() {
+    let gpu = gpu();
+    let effect = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float).unwrap();
+    gpu.run(|encoder| effect.render(encoder));
+}
+
+#[test]
+fn sizes_may_change_from_frame_to_frame() {
+    let gpu = gpu();
+    let mut effect = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float).unwrap();
+    for size in [[16, 8], [1, 1], [1, 40], [33, 7], [16, 8]] {
+        let target = |format| gpu.target("input", size, format);
+        effect
+            .prepare(
+                &gpu.device,
+                &gpu.queue,
+                &ScreenFrame {
+                    irradiance: &target(TextureFormat::Rgba16Float),
+                    depth: &target(TextureFormat::Depth32Float),
+                    profile_id: &target(TextureFormat::R8Uint),
+                    output: &target(TextureFormat::Rgba16Float),
+                    projection: common::View::perspective(size, 40.0).projection.as_mat4(),
+                    mm_per_unit: 1.0,
+                    profiles: &[Profile::SKIN],
+                },
+            )
+            .unwrap();
+        gpu.run(|encoder| effect.render(encoder));
+    }
+}

@@ -1,0 +1,169 @@
+//! The texture-space path against closed forms.
+
+mod common;
+
+use common::*;
+use glam::{DVec2, DVec3};
+use subsurface::wgpu::TextureFormat;
+use subsurface::{Atlas, Profile, TextureSpace};
+
+/// Position in mm and irradiance of a texel; `None` off the islands.
+type Texel = Option<(DVec3, DVec3)>;
+
+/// The path over an atlas of this many texels a side; `texel` takes the texel's centre.
+fn scatter(size: u32, profile: &Profile, texel: impl Fn(DVec2) -> Texel) -> Vec<DVec3> {
+    let gpu = gpu();
+    let (mut irradiance, mut positions) = (Vec::new(), Vec::new());
+    for y in 0..size {
+        for x in 0..size {
+            let found = texel(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+            let (p, e) = found.unwrap_or_default();
+            irradiance.push(e.as_vec3().extend(1.0).to_array());
+            // In metres, as most scenes are.
+            let id = f32::from(u8::from(found.is_some()));
+            positions.push((p * 1e-3).as_vec3().extend(id).to_array());
+        }
+    }
+    let format = TextureFormat::Rgba32Float;
+    let output = gpu.target("output", [size; 2], format);
+    let mut path = TextureSpace::new(&gpu.device, format).unwrap();
+    path.prepare(
+        &gpu.device,
+        &gpu.queue,
+        &Atlas {
+            irradiance: &gpu.upload("irradiance", [size; 2], format, &irradiance),
+            positions: &gpu.upload("positions", [size; 2], format, &positions),
+            output: &output,
+            mm_per_unit: 1000.0,
+            profiles: &[*profile],
+        },
+    )
+    .unwrap();
+    gpu.run(|encoder| path.render(encoder));
+    gpu.read(&output)
+        .iter()
+        .map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into()))
+        .collect()
+}
+
+fn center(i: usize, size: u32) -> DVec2 {
+    DVec2::new(
+        f64::from(i as u32 % size) + 0.5,
+        f64::from(i as u32 / size) + 0.5,
+    )
+}
+
+#[test]
+fn a_stretched_patch_matches_the_closed_form() {
+    // mm per texel along u and v: square, stretched 2:1, and sheared.
+    for (name, u, v) in [
+        ("square", DVec2::new(0.15, 0.0), DVec2::new(0.0, 0.15)),
+        ("2:1", DVec2::new(0.2, 0.0), DVec2::new(0.0, 0.1)),
+        ("1:2, sheared", DVec2::new(0.1, 0.05), DVec2::new(0.08, 0.2)),
+    ] {
+        let size = 320;
+        let place = |t: DVec2| (t.x - 160.0) * u + (t.y - 160.0) * v;
+        for angle in [0.0, 27.0, 45.0, 90.0f64] {
+            let across = DVec2::from_angle(angle.to_radians());
+            let blur_mm2 = 0.04; // σ = .2 mm: a texel at its longest
+            let out = scatter(size, &Profile::SKIN, |t| {
+                let p = place(t);
+                Some((p.extend(7.0), DVec3::splat(step(p.dot(across), blur_mm2))))
+            });
+            let mut worst: f64 = 0.0;
+            for (i, e) in out.iter().enumerate() {
+                // Away from where the atlas's edge cuts the kernel.
+                let t = center(i, size);
+                let margin = DVec2::new(9.6 / u.length(), 9.6 / v.length()) * 1.25;
+                let inside = (t - 160.0).abs().cmplt(DVec2::splat(160.0) - margin).all();
+                if inside {
+                    let truth = scattered_step(place(t).dot(across), blur_mm2, &Profile::SKIN);
+                    worst = worst.max((*e - truth).abs().max_element());
+                }
+            }
+            println!("{name}, edge at {angle}°: max error {worst:.5}");
+            // One step of eight bits.
+            assert!(
+                worst <= 1.0 / 255.0 && worst > 0.0,
+                "{name}, {angle}°: {worst}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_sphere_matches_eq_7() {
+    // The upper half, unrolled by its polar angle: texels shrink and shear all over.
+    let (rho_mm, size) = (10.0, 256);
+    let light = DVec3::new(1.0, 0.0, 1.0).normalize();
+    let normal = |t: DVec2| {
+        let d = (t - 128.0) / 120.0;
+        let theta = d.length() * 1.9;
+        (d.length() < 1.0).then(|| {
+            let around = d.normalize_or(DVec2::X);
+            (around * theta.sin()).extend(theta.cos())
+        })
+    };
+    let truth = scattered_cosine(rho_mm, &Profile::SKIN);
+    let out = scatter(size, &Profile::SKIN, |t| {
+        normal(t).map(|n| (n * rho_mm, DVec3::splat(n.dot(light).max(0.0))))
+    });
+    let errors = out.iter().enumerate().filter_map(|(i, e)| {
+        // The island ends at 109°; its edge cuts kernels up to 9.6 mm, or 55°, away.
+        let n = normal(center(i, size)).filter(|n| n.z > 55f64.to_radians().cos())?;
+        Some(e.x - truth(n.dot(light)).x)
+    });
+    let red = rms(errors);
+    println!("red RMS {red:.5}");
+    // As on the screen, where the surface is seen whole.
+    assert!(red <= 0.003, "{red}");
+}
+
+#[test]
+fn islands_do_not_run_into_each_other() {
+    // Two islands a texel apart in the atlas and a metre apart in space.
+    let size = 128;
+    let island = |t: DVec2| t.x < 63.0 || t.x > 65.0;
+    let texel = |t: DVec2| {
+        let far = t.x > 64.0;
+        let p = (t * 0.2).extend(if far { 1000.0 } else { 0.0 });
+        island(t).then(|| {
+            (
+                p,
+                if far {
+                    DVec3::ONE
+                } else {
+                    DVec3::new(0.25, 0.5, 0.0)
+                },
+            )
+        })
+    };
+    let out = scatter(size, &Profile::SKIN, texel);
+    for (i, e) in out.iter().enumerate() {
+        if let Some((_, before)) = texel(center(i, size)) {
+            // Rounding only.
+            assert!((*e - before).abs().max_element() < 1e-5, "texel {i}: {e}");
+        }
+    }
+}
+
+#[test]
+fn islands_are_dilated() {
+    let size = 64;
+    let inside = |t: DVec2| (t - 32.0).abs().max_element() < 16.0;
+    let e = DVec3::new(0.3, 0.6, 0.9);
+    let out = scatter(size, &Profile::SKIN, |t| {
+        inside(t).then(|| ((t * 0.2).extend(0.0), e))
+    });
+    for (i, found) in out.iter().enumerate() {
+        let outside = (center(i, size) - 32.0).abs().max_element() - 16.0;
+        if outside < 4.0 {
+            assert!(
+                (*found - e).abs().max_element() < 1e-5,
+                "texel {i}: {found}"
+            );
+        } else {
+            assert_eq!(*found, DVec3::ZERO, "texel {i}");
+        }
+    }
+}
