@@ -32,7 +32,6 @@ impl Skin {
     fn scatter(
         &mut self,
         device: &wgpu::Device,
-        queue: &wgpu::Queue,
         encoder: &mut wgpu::CommandEncoder,
         frame: &Frame,
     ) -> Result<(), Error> {
@@ -45,7 +44,7 @@ impl Skin {
             mm_per_unit: 1000.0, // a scene in metres
             profiles: &[Profile::SKIN],
         };
-        self.effect.prepare(device, queue, &inputs)?;
+        self.effect.prepare(device, &inputs)?;
         self.effect.render(encoder);
         Ok(())
     }
@@ -56,7 +55,7 @@ fn main() -> Result<(), Error> {
     let frame = made_up_frame(&gpu);
     let mut skin = Skin::new(&gpu.device)?;
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    skin.scatter(&gpu.device, &gpu.queue, &mut encoder, &frame)?;
+    skin.scatter(&gpu.device, &mut encoder, &frame)?;
     gpu.queue.submit([encoder.finish()]);
 
     let width = frame.scattered.texture().width() as usize;

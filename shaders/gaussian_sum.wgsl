@@ -12,12 +12,14 @@ struct Settings {
     // Weights of red, green and blue, and the variance in mm²: Gaussian i of profile id is at
     // 8·(id − 1) + i.
     gaussians: array<vec4f, 128>,
-    // The least mm between neighbouring pixels at view depth z: x + y·z along a row, z + w·z along
-    // a column. Zero: as far as the surface itself says.
+    // The mm between neighbouring pixels of a surface that faces the camera, at view depth z:
+    // |x + y·z| along a row, |z + w·z| along a column. Zero: as far as the surface itself says.
     spacing: vec4f,
     mm_per_unit: f32,
     // Pixels to which the result is carried past the edge of the surface.
     gutter: i32,
+    // Ids beyond this have no profile: no surface.
+    profiles: u32,
 }
 
 @group(0) @binding(0) var<uniform> settings: Settings;
@@ -38,6 +40,10 @@ const REACH_SIGMAS = 3.5;
 const SQUARE_REACH = 2;
 // Variance along a row, in px², from which the nearest pixel stands for a sheared tap.
 const WIDE_PX2 = 9.0;
+// How far a row may stray from the tangent plane before it is weighed anew: in squared mm as a
+// share of the squared distance, and of the variance.
+const BEND = 0.35;
+const STRAY = 0.15;
 
 struct Vertex {
     @builtin(position) position: vec4f,
@@ -62,7 +68,8 @@ fn size() -> vec2i {
 
 fn point(pixel: vec2i) -> Point {
     let texel = textureLoad(positions, pixel, 0);
-    return Point(texel.xyz * settings.mm_per_unit, u32(texel.w));
+    let profile = u32(texel.w);
+    return Point(texel.xyz * settings.mm_per_unit, select(0u, profile, profile <= settings.profiles));
 }
 
 fn point_or_none(pixel: vec2i) -> Point {
@@ -106,27 +113,22 @@ struct Metric {
 }
 
 fn metric(pixel: vec2i, here: Point) -> Metric {
+    let facing = abs(settings.spacing.xz + settings.spacing.yw * here.mm.z);
+    let is_screen = any(settings.spacing != vec4f(0.0));
     let tx = tangent(pixel, vec2i(1, 0), here);
     let ty = tangent(pixel, vec2i(0, 1), here);
-    var xx = dot(tx, tx);
-    var yy = dot(ty, ty);
-    let xy = dot(tx, ty);
-    // A strip one pixel wide has no width of its own: it is taken to be as wide as a pixel is long.
-    if xx == 0.0 {
-        xx = yy;
+    let xx = dot(tx, tx);
+    let yy = dot(ty, ty);
+    if xx == 0.0 || yy == 0.0 {
+        // A strip one pixel wide has no width of its own: it is taken to be as wide as it faces the
+        // camera, or as its pixels are long.
+        let width = select(vec2f(sqrt(max(xx, yy))), facing, is_screen);
+        let spacing = max(width, vec2f(sqrt(xx), sqrt(yy)));
+        return Metric(spacing.x * spacing.y, 0.0, spacing.x * spacing.x, spacing);
     }
-    if yy == 0.0 {
-        yy = xx;
-    }
-    if xx == 0.0 {
-        return Metric(1.0, 0.0, 0.0, vec2f(1.0));
-    }
-    let area = sqrt(max(xx * yy - xy * xy, 0.0));
-    var spacing = vec2f(sqrt(xx), area / sqrt(xx));
-    if settings.spacing.x + abs(settings.spacing.y) > 0.0 {
-        spacing = abs(settings.spacing.xz + settings.spacing.yw * here.mm.z);
-    }
-    return Metric(area, xy / xx, xx, spacing);
+    let area = length(cross(tx, ty));
+    let spacing = select(vec2f(sqrt(xx), area / sqrt(xx)), facing, is_screen);
+    return Metric(area, dot(tx, ty) / xx, xx, spacing);
 }
 
 fn gaussian(here: Point, i: u32) -> vec4f {
@@ -190,19 +192,19 @@ fn fs_rows(vertex: Vertex) -> @location(0) vec4f {
     let spacing = metric(pixel, here).spacing;
     let v = gaussian(here, vertex.gaussian).w;
     let reach = reach(spacing, v);
-    if all(reach <= vec2i(SQUARE_REACH)) {
-        return vec4f(0.0);
-    }
-    let variance_mm2 = lattice_variance(v, spacing.x);
-    let first = max(pixel.x - reach.x, 0);
-    let last = min(pixel.x + reach.x, size().x - 1);
+    return row(pixel, here, reach.x, lattice_variance(v, spacing.x));
+}
+
+// The pixels of a row around q, as `here` weighs them.
+fn row(q: vec2i, here: Point, reach: i32, variance_mm2: f32) -> vec4f {
+    let first = max(q.x - reach, 0);
+    let last = min(q.x + reach, size().x - 1);
     var total = vec4f(0.0);
     for (var x = first; x <= last; x++) {
-        let q = vec2i(x, pixel.y);
-        let there = point(q);
+        let there = point(vec2i(x, q.y));
         if there.profile == here.profile {
             let w = weight(distance2(there.mm, here.mm), variance_mm2);
-            total += w * textureLoad(source, q, 0);
+            total += w * textureLoad(source, vec2i(x, q.y), 0);
         }
     }
     return total;
@@ -231,46 +233,86 @@ fn square(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32) -> vec4f {
     return total;
 }
 
-// A row's sum as `here` weighs it, δ = `delta` pixels along the row from where it is wanted: by
-// the distance without its part M₀₀δ², which the first pass has spent. Zero off the surface.
-fn row_at(q: vec2i, delta: f32, here: Point, m: Metric, variance_mm2: f32) -> vec4f {
+// What the second pass needs to know of a pixel.
+struct Center {
+    pixel: vec2i,
+    point: Point,
+    shear: f32,
+    m00: f32,
+    // Squared mm between sheared rows on the tangent plane: M₁₁ − κ²M₀₀.
+    m11: f32,
+    // Whether the first pass was so wide that the pixel nearest to a tap can stand for it.
+    wide: bool,
+    variance_mm2: f32,
+}
+
+// Marks a row that strays: its sum was weighed from a pixel far off the center's tangent plane, on
+// another layer, around a sharp bend or off the surface.
+const STRAYS = vec4f(0.0, 0.0, 0.0, -1.0);
+
+// The sum of the row of pixel q as the center weighs it, q being δ = `delta` pixels off the sheared
+// line and `dy` rows off the center: by the distance without its part M₀₀δ², which the first pass
+// has spent.
+fn row_of(q: vec2i, dy: f32, delta: f32, center: Center) -> vec4f {
     if q.x < 0 || q.x >= size().x {
-        return vec4f(0.0);
+        return STRAYS;
     }
     let there = point(q);
-    if there.profile != here.profile {
-        return vec4f(0.0);
+    let d2 = max(distance2(there.mm, center.point.mm) - center.m00 * delta * delta, 0.0);
+    let plane2 = center.m11 * dy * dy;
+    if there.profile != center.point.profile
+        || d2 - plane2 > BEND * plane2 + STRAY * center.variance_mm2 {
+        return STRAYS;
     }
-    let d2 = max(distance2(there.mm, here.mm) - m.m00 * delta * delta, 0.0);
-    return weight(d2, variance_mm2) * textureLoad(rows, q, 0);
+    return weight(d2, center.variance_mm2) * textureLoad(rows, q, 0);
+}
+
+// The sum of row y on the sheared line, between two pixels.
+fn row_at(y: i32, center: Center) -> vec4f {
+    let dy = f32(y - center.pixel.y);
+    let dx = -center.shear * dy;
+    if center.wide {
+        // Rounds alike on both sides, so that it shifts nothing.
+        let nearest = sign(dx) * floor(abs(dx) + 0.5);
+        return row_of(vec2i(center.pixel.x + i32(nearest), y), dy, nearest - dx, center);
+    }
+    let q = vec2i(center.pixel.x + i32(floor(dx)), y);
+    let f = fract(dx);
+    let left = row_of(q, dy, -f, center);
+    if f == 0.0 {
+        return left;
+    }
+    let right = row_of(q + vec2i(1, 0), dy, 1.0 - f, center);
+    return select(mix(left, right, f), STRAYS, left.a < 0.0 || right.a < 0.0);
 }
 
 // Second pass: over the rows along the sheared step (−κ, 1), which completes the square
-// M₀₀(dx + κ dy)² + (M₁₁ − κ²M₀₀)dy². Sheared taps fall between two pixels.
+// M₀₀(dx + κ dy)² + (M₁₁ − κ²M₀₀)dy². Rows that stray are weighed anew from the center, in a loop
+// of their own, since few pixels have any.
 fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32) -> vec4f {
+    let m11 = m.area * m.area / m.m00;
     let variance_mm2 = lattice_variance(v, m.spacing.y);
+    let wide = v > WIDE_PX2 * m.m00;
+    let center = Center(pixel, here, m.shear, m.m00, m11, wide, variance_mm2);
     let first = max(pixel.y - reach.y, 0);
     let last = min(pixel.y + reach.y, size().y - 1);
     var total = vec4f(0.0);
-    if v > WIDE_PX2 * m.m00 {
-        // The nearer pixel will do: it rounds alike on both sides, so that it shifts nothing.
-        for (var y = first; y <= last; y++) {
-            let dx = -m.shear * f32(y - pixel.y);
-            let nearest = sign(dx) * floor(abs(dx) + 0.5);
-            let q = vec2i(pixel.x + i32(nearest), y);
-            total += row_at(q, nearest - dx, here, m, variance_mm2);
-        }
-        return total;
-    }
+    var first_stray = last + 1;
+    var last_stray = first - 1;
     for (var y = first; y <= last; y++) {
-        let dx = -m.shear * f32(y - pixel.y);
-        let q = vec2i(pixel.x + i32(floor(dx)), y);
-        let f = fract(dx);
-        let left = row_at(q, -f, here, m, variance_mm2);
-        let right = row_at(q + vec2i(1, 0), 1.0 - f, here, m, variance_mm2);
-        let share = vec2f(1.0 - f, f) * step(vec2f(1e-30), vec2f(left.a, right.a));
-        if share.x + share.y > 0.0 {
-            total += (share.x * left + share.y * right) / (share.x + share.y);
+        let row = row_at(y, center);
+        if row.a < 0.0 {
+            first_stray = min(first_stray, y);
+            last_stray = y;
+        } else {
+            total += row;
+        }
+    }
+    for (var y = first_stray; y <= last_stray; y++) {
+        if row_at(y, center).a < 0.0 {
+            let up = f32(y - pixel.y) / f32(reach.y);
+            let across = i32(ceil(f32(reach.x) * sqrt(1.0 - up * up)));
+            total += row(vec2i(pixel.x, y), here, across, variance_mm2);
         }
     }
     return total;
@@ -298,6 +340,10 @@ fn fs_sum(vertex: Vertex) -> @location(0) vec4f {
         total = square(pixel, here, m, reach, g.w);
     } else {
         total = sheared_rows(pixel, here, m, reach, g.w);
+    }
+    if total.a <= 0.0 {
+        // No area to speak of: nothing to share with.
+        return vec4f(before + g.rgb * textureLoad(irradiance, pixel, 0).rgb, 1.0);
     }
     return vec4f(before + g.rgb * total.rgb / total.a, 1.0);
 }

@@ -5,7 +5,6 @@
 struct Settings {
     // Normalised device coordinates to view space, in mm.
     inverse_projection: mat4x4f,
-    profiles: u32,
 }
 
 @group(0) @binding(0) var<uniform> settings: Settings;
@@ -23,7 +22,7 @@ fn vs_main(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
 fn fs_positions(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let pixel = vec2i(at.xy);
     let id = textureLoad(profile_id, pixel, 0).r;
-    if id == 0u || id > settings.profiles {
+    if id == 0u {
         return vec4f(0.0);
     }
     let uv = at.xy / vec2f(textureDimensions(depth));

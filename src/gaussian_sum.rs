@@ -3,9 +3,9 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
+use wgpu::util::DeviceExt;
 use wgpu::{
-    BindGroup, BindGroupLayout, CommandEncoder, Device, Queue, RenderPipeline, TextureFormat,
-    TextureView,
+    BindGroup, BindGroupLayout, CommandEncoder, Device, RenderPipeline, TextureFormat, TextureView,
 };
 
 use crate::{MAX_PROFILES, Profile};
@@ -30,13 +30,15 @@ pub(crate) struct Settings {
     pub mm_per_unit: f32,
     /// Pixels.
     pub gutter: i32,
-    pub pad: [u32; 2],
+    pub profiles: u32,
+    pub pad: u32,
 }
 
 impl Settings {
     pub fn new(profiles: &[Profile], mm_per_unit: f32) -> Self {
         let mut settings = Self {
             mm_per_unit,
+            profiles: profiles.len() as u32,
             ..Self::zeroed()
         };
         for (slots, profile) in settings
@@ -55,7 +57,6 @@ impl Settings {
 /// The passes, and what they need for the frame that was last prepared.
 pub(crate) struct GaussianSum {
     label: &'static str,
-    settings: wgpu::Buffer,
     source: Pass,
     rows: Pass,
     sum: Pass,
@@ -114,22 +115,20 @@ impl GaussianSum {
         };
         Self {
             label,
-            settings: device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(&format!("{label} settings")),
-                size: size_of::<Settings>() as u64,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
             source: pass("fs_source", &[POSITIONS, IRRADIANCE], SCRATCH),
             rows: pass("fs_rows", &[POSITIONS, SOURCE], SCRATCH),
-            sum: pass("fs_sum", &[POSITIONS, SOURCE, ROWS, SUM], SCRATCH),
+            sum: pass(
+                "fs_sum",
+                &[POSITIONS, IRRADIANCE, SOURCE, ROWS, SUM],
+                SCRATCH,
+            ),
             resolve: pass("fs_resolve", &[POSITIONS, IRRADIANCE, SUM], output_format),
             scratch: None,
             frame: None,
         }
     }
 
-    pub fn prepare(&mut self, device: &Device, queue: &Queue, inputs: &Inputs) {
+    pub fn prepare(&mut self, device: &Device, inputs: &Inputs) {
         let texture = inputs.irradiance.texture();
         let size = [texture.width(), texture.height()];
         if self.scratch.as_ref().is_none_or(|s| s.size != size) {
@@ -139,10 +138,10 @@ impl GaussianSum {
         let scratch = self
             .scratch
             .get_or_insert_with(|| Scratch::new(device, size, label));
-        queue.write_buffer(&self.settings, 0, bytemuck::bytes_of(&inputs.settings));
+        let settings = uniform(device, &format!("{label} settings"), &inputs.settings);
 
         let group = |pass: &Pass, sum: usize| {
-            pass.bind(device, &self.settings, |binding| match binding {
+            pass.bind(device, &settings, |binding| match binding {
                 POSITIONS => inputs.positions,
                 IRRADIANCE => inputs.irradiance,
                 SOURCE => &scratch.source,
@@ -191,6 +190,15 @@ impl Scratch {
             sums: [view("sum 0"), view("sum 1")],
         }
     }
+}
+
+/// A uniform buffer of its own for each frame, so that several may be recorded before a submit.
+pub(crate) fn uniform<T: Pod>(device: &Device, label: &str, contents: &T) -> wgpu::Buffer {
+    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some(label),
+        contents: bytemuck::bytes_of(contents),
+        usage: wgpu::BufferUsages::UNIFORM,
+    })
 }
 
 /// A full-float texture that passes hand to each other.
@@ -379,7 +387,8 @@ mod tests {
                 gaussians,
                 spacing,
                 mm_per_unit,
-                gutter
+                gutter,
+                profiles
             }
         );
     }

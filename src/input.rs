@@ -7,8 +7,10 @@ use crate::{Error, Profile};
 /// What a texture is read or written as.
 #[derive(Clone, Copy)]
 pub(crate) enum Role {
-    /// Read as floats.
+    /// Read as linear RGB, and alpha where there is one.
     Color,
+    /// Read as positions.
+    Positions,
     /// Read as one float, from a depth or a single-channel format.
     Depth,
     /// Read as an unsigned integer.
@@ -30,12 +32,13 @@ pub(crate) fn check_texture(
     let float = matches!(kind, Some(TextureSampleType::Float { .. }));
     let (format_fits, format_needs) = match role {
         Role::Color => (
-            float && format.components() == 4,
-            "four float channels".into(),
+            float && format.components() >= 3,
+            "three or four float channels".into(),
         ),
+        Role::Positions => (format == TextureFormat::Rgba32Float, "Rgba32Float".into()),
         Role::Depth => (
-            format.has_depth_aspect() || (float && format.components() == 1),
-            "a depth format or one float channel".into(),
+            format.has_depth_aspect() || format == TextureFormat::R32Float,
+            "a depth format or R32Float".into(),
         ),
         Role::Id => (
             matches!(kind, Some(TextureSampleType::Uint)) && format.components() == 1,
@@ -134,6 +137,7 @@ pub(crate) fn check_output_format(
     );
     let features = format.guaranteed_format_features(device.features());
     if !float
+        || format.components() < 3
         || !features
             .allowed_usages
             .contains(TextureUsages::RENDER_ATTACHMENT)
@@ -141,7 +145,7 @@ pub(crate) fn check_output_format(
         return Err(Error::new(
             "output_format",
             format!("{format:?}"),
-            "a float format that this device renders to",
+            "a format of three or four float channels that this device renders to",
         ));
     }
     Ok(())

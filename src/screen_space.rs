@@ -3,7 +3,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DMat4, DVec3, Mat4, Vec4};
-use wgpu::{CommandEncoder, Device, Queue, TextureFormat, TextureView};
+use wgpu::{CommandEncoder, Device, TextureFormat, TextureView};
 
 use crate::gaussian_sum::{self, GaussianSum, Inputs};
 use crate::input::{self, Role};
@@ -45,7 +45,6 @@ pub struct ScreenFrame<'a> {
 /// Scratch memory: 80 bytes a pixel.
 pub struct ScreenSpace {
     output_format: TextureFormat,
-    settings: wgpu::Buffer,
     layout: wgpu::BindGroupLayout,
     pipeline: wgpu::RenderPipeline,
     positions: Option<TextureView>,
@@ -58,8 +57,6 @@ pub struct ScreenSpace {
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Settings {
     inverse_projection: Mat4,
-    profiles: u32,
-    pad: [u32; 3],
 }
 
 impl ScreenSpace {
@@ -83,12 +80,6 @@ impl ScreenSpace {
         });
         Ok(Self {
             output_format,
-            settings: device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: size_of::<Settings>() as u64,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
             pipeline: gaussian_sum::full_screen(
                 device,
                 &shader,
@@ -109,12 +100,7 @@ impl ScreenSpace {
     ///
     /// # Errors
     /// The first input that does not fit; the frame prepared before stays in place.
-    pub fn prepare(
-        &mut self,
-        device: &Device,
-        queue: &Queue,
-        frame: &ScreenFrame,
-    ) -> Result<(), Error> {
+    pub fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<(), Error> {
         let size = input::size(frame.irradiance);
         input::check_texture("irradiance", frame.irradiance, Role::Color, size)?;
         input::check_texture("depth", frame.depth, Role::Depth, size)?;
@@ -137,14 +123,10 @@ impl ScreenSpace {
         input::check_profiles(frame.profiles)?;
         let inverse_projection = inverse_mm(frame.projection, frame.mm_per_unit)?;
 
-        queue.write_buffer(
-            &self.settings,
-            0,
-            bytemuck::bytes_of(&Settings {
-                inverse_projection,
-                profiles: frame.profiles.len() as u32,
-                pad: [0; 3],
-            }),
+        let settings = gaussian_sum::uniform(
+            device,
+            "subsurface::ScreenSpace positions",
+            &Settings { inverse_projection },
         );
         let positions = match self.positions.take() {
             Some(view) if input::size(&view) == size => view,
@@ -156,7 +138,7 @@ impl ScreenSpace {
             entries: &[
                 wgpu::BindGroupEntry {
                     binding: 0,
-                    resource: self.settings.as_entire_binding(),
+                    resource: settings.as_entire_binding(),
                 },
                 wgpu::BindGroupEntry {
                     binding: 1,
@@ -170,7 +152,6 @@ impl ScreenSpace {
         }));
         self.sum.prepare(
             device,
-            queue,
             &Inputs {
                 positions: &positions,
                 irradiance: frame.irradiance,
@@ -243,10 +224,7 @@ mod tests {
         assert_layout!(
             include_str!("../shaders/screen_space.wgsl"),
             "Settings",
-            Settings {
-                inverse_projection,
-                profiles
-            }
+            Settings { inverse_projection }
         );
     }
 }

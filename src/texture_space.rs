@@ -1,6 +1,6 @@
 //! Scattering in texture space, the way of Li & Shao 2015: the reference path.
 
-use wgpu::{CommandEncoder, Device, Queue, TextureFormat, TextureView};
+use wgpu::{CommandEncoder, Device, TextureFormat, TextureView};
 
 use crate::gaussian_sum::{GaussianSum, Inputs, Settings};
 use crate::input::{self, Role};
@@ -20,8 +20,8 @@ pub struct Atlas<'a> {
     /// Lit diffuse irradiance E at each texel, linear RGB, before albedo; four float channels.
     pub irradiance: &'a TextureView,
     /// Position of each texel's point in scene units, and in alpha the number of its profile in
-    /// `profiles`, counted from 1; 0 where there is no surface. Rgba32Float: half a float's digits
-    /// are not enough for pores.
+    /// `profiles`, counted from 1; 0 where there is no surface. Rgba32Float; relative to the mesh
+    /// where the world is large, since a kilometre away a float's step is .06 mm.
     pub positions: &'a TextureView,
     /// Where the scattered irradiance goes, in the format that [`TextureSpace::new`] was told;
     /// islands are dilated by 4 texels.
@@ -68,10 +68,10 @@ impl TextureSpace {
     ///
     /// # Errors
     /// The first input that does not fit; the atlas prepared before stays in place.
-    pub fn prepare(&mut self, device: &Device, queue: &Queue, atlas: &Atlas) -> Result<(), Error> {
+    pub fn prepare(&mut self, device: &Device, atlas: &Atlas) -> Result<(), Error> {
         let size = input::size(atlas.irradiance);
         input::check_texture("irradiance", atlas.irradiance, Role::Color, size)?;
-        input::check_texture("positions", atlas.positions, Role::Color, size)?;
+        input::check_texture("positions", atlas.positions, Role::Positions, size)?;
         input::check_texture(
             "output",
             atlas.output,
@@ -89,7 +89,6 @@ impl TextureSpace {
         input::check_profiles(atlas.profiles)?;
         self.sum.prepare(
             device,
-            queue,
             &Inputs {
                 positions: atlas.positions,
                 irradiance: atlas.irradiance,

@@ -51,7 +51,6 @@ fn screen(change: impl FnOnce(&mut Inputs)) -> Result<(), Error> {
     let mut effect = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float)?;
     let result = effect.prepare(
         &gpu.device,
-        &gpu.queue,
         &ScreenFrame {
             irradiance: &inputs.irradiance,
             depth: &inputs.depth,
@@ -99,6 +98,12 @@ fn what_fits_is_taken() {
         screen(|i| i.depth = view(depth)).unwrap();
     }
     screen(|i| i.irradiance = view(TextureFormat::Rgba32Float)).unwrap();
+    let packed = texture(
+        TextureFormat::Rg11b10Ufloat,
+        TextureUsages::TEXTURE_BINDING,
+        1,
+    );
+    screen(|i| i.irradiance = packed).unwrap();
     screen(|i| i.profile_id = view(TextureFormat::R32Uint)).unwrap();
     screen(|i| i.profiles = vec![Profile::SKIN; 16]).unwrap();
 }
@@ -119,6 +124,8 @@ fn what_does_not_fit_is_named() {
     refused("depth: format", |i| {
         i.depth = view(TextureFormat::Rgba16Float)
     });
+    refused("depth: format", |i| i.depth = view(TextureFormat::R8Unorm));
+    refused("depth: format", |i| i.depth = view(TextureFormat::R16Float));
     refused("profile_id: format", |i| {
         i.profile_id = view(TextureFormat::R8Unorm)
     });
@@ -183,7 +190,6 @@ fn the_atlas_is_checked_too() {
     let mut prepare = |positions: &TextureView, output: &TextureView| {
         path.prepare(
             &gpu.device,
-            &gpu.queue,
             &Atlas {
                 irradiance: &irradiance,
                 positions,
@@ -223,7 +229,6 @@ fn sizes_may_change_from_frame_to_frame() {
         effect
             .prepare(
                 &gpu.device,
-                &gpu.queue,
                 &ScreenFrame {
                     irradiance: &target(TextureFormat::Rgba16Float),
                     depth: &target(TextureFormat::Depth32Float),

@@ -4,8 +4,8 @@ mod common;
 
 use common::*;
 use glam::{DMat4, DVec2, DVec3, DVec4};
-use subsurface::Profile;
-use subsurface::wgpu::TextureFormat;
+use subsurface::wgpu::{self, TextureFormat};
+use subsurface::{Profile, ScreenFrame, ScreenSpace};
 
 /// A step of this error in a picture is one step of eight bits.
 const STEP: f64 = 1.0 / 255.0;
@@ -163,6 +163,38 @@ fn slopes_match_the_closed_form() {
 }
 
 #[test]
+fn a_plane_in_perspective_matches_the_visible_sum() {
+    // From 6 to 2 pixels a millimetre, each kernel of skin reaches over fewer and fewer pixels, and
+    // goes from two passes to one. Stripes of .9 mm tell what any of them misses.
+    let normal = tilted_normal(-60.0, 15.0);
+    let view = View::perspective([200, 360], 30.0);
+    let g = view.shoot(plane(normal, 150.0, |p| {
+        DVec3::splat(0.5 + 0.5 * (7.0 * p.x).sin() * (3.0 * p.y).cos())
+    }));
+    let out = g.scatter(&Profile::SKIN);
+    // A column crosses all that happens from row to row.
+    let column = |(i, _): &(usize, Hit)| i % 200 == 100;
+    let pixels: Vec<_> = g.pixels(|_| true).into_iter().filter(column).collect();
+    let worst = pixels
+        .iter()
+        .map(|(i, _)| {
+            (out[*i] - g.visible_sum(*i, &Profile::SKIN))
+                .abs()
+                .max_element()
+        })
+        .fold(0.0, f64::max);
+    let px_per_mm = |i: usize| g.pixels_mm2[pixels[i].0].sqrt().recip();
+    println!(
+        "{:.1} to {:.1} px/mm: max error {worst:.5} over {} pixels",
+        px_per_mm(0),
+        px_per_mm(pixels.len() - 1),
+        pixels.len()
+    );
+    // M is the plane's at each pixel: exact to first order in perspective.
+    assert!(worst <= STEP, "{worst}");
+}
+
+#[test]
 fn a_sphere_matches_eq_7() {
     let rho_mm = 10.0;
     let light = DVec3::new(1.0, 0.0, 1.0).normalize();
@@ -188,8 +220,9 @@ fn a_sphere_matches_eq_7() {
         println!(
             "{px_per_mm} px/mm: red RMS {whole:.5}, n_z > .35 {interior:.5}, unscattered {none:.5}"
         );
-        // What the hidden half contributes, .0060, no screen-space method can know.
-        assert!(whole <= 0.012, "whole sphere: {whole}");
+        // What the hidden half contributes is missing at the rim, whatever the method: about half
+        // of what scattering does there. The issue of this bar allows .012.
+        assert!(whole <= 0.006, "whole sphere: {whole}");
         assert!(interior <= 0.003, "interior: {interior}");
     }
 }
@@ -213,9 +246,9 @@ fn a_sphere_matches_the_visible_sum() {
         "red RMS {red:.5}, blue RMS {blue:.5} over {} pixels",
         pixels.len()
     );
-    // Two passes over a curved surface are not the full sum; .7 % is what a face shows
-    // (numerics: .1 to .7 % of the visible integral).
-    assert!(red <= 0.007 && blue <= 0.003, "red {red}, blue {blue}");
+    // Two passes over a sphere are not the full sum: .0023 measured, at the rim, against .0108 that
+    // scattering does. Blue scatters too narrowly to see the bend.
+    assert!(red <= 0.003 && blue <= 0.0005, "red {red}, blue {blue}");
 }
 
 #[test]
@@ -248,19 +281,8 @@ fn layers_leak_what_the_visible_sum_says() {
                 }
             }
             println!("{gap_mm} mm, edge at {angle}°: max error {worst:.5}, leak {leak:.5}");
-            // An edge along the rows or columns keeps every pass within one layer or crosses it
-            // once. A slanted one makes the second pass cross twice, which weighs the gap twice:
-            // a limit of two passes (docs/method.md), held here so that it grows no further.
-            let slanted = angle % 90.0 != 0.0;
-            let limit = if !slanted || gap_mm >= 10.0 {
-                0.002
-            } else if gap_mm >= 5.0 {
-                0.006
-            } else {
-                0.035
-            };
             assert!(
-                worst <= limit,
+                worst <= 0.002,
                 "{gap_mm} mm, {angle}°: {worst} from the visible sum"
             );
             assert!(
@@ -271,23 +293,29 @@ fn layers_leak_what_the_visible_sum_says() {
     }
 }
 
-/// Distance in mm between a quarter and three quarters of a vertical edge's height.
-fn edge_width_mm(view: View) -> f64 {
+/// Distance in mm between a quarter and three quarters of an edge's height, across `across`: x or y.
+fn edge_width_mm(view: View, across: DVec3) -> f64 {
     let blur_mm2 = 0.3;
     let g = view.shoot(plane(DVec3::Z, 120.0, |p| {
-        DVec3::splat(step(p.x, blur_mm2))
+        DVec3::splat(step(p.dot(across), blur_mm2))
     }));
     let out = g.scatter(&single_gaussian(1.0));
-    let row = (view.size[1] / 2 * view.size[0]) as usize;
+    let [width, height] = view.size.map(|s| s as usize);
+    // The middle row, or the middle column from below, since y points up.
+    let line: Vec<usize> = if across.x > 0.0 {
+        (0..width).map(|x| height / 2 * width + x).collect()
+    } else {
+        (0..height).rev().map(|y| y * width + width / 2).collect()
+    };
     let crossing = |level: f64| {
-        (row..row + view.size[0] as usize - 1)
-            .find(|&i| out[i].x < level && out[i + 1].x >= level)
+        line.windows(2)
+            .find(|i| out[i[0]].x < level && out[i[1]].x >= level)
             .map(|i| {
-                let t = (level - out[i].x) / (out[i + 1].x - out[i].x);
-                let x = |i: usize| g.hits[i].unwrap().point.x;
-                x(i) + t * (x(i + 1) - x(i))
+                let t = (level - out[i[0]].x) / (out[i[1]].x - out[i[0]].x);
+                let place = |i: usize| g.hits[i].unwrap().point.dot(across);
+                place(i[0]) + t * (place(i[1]) - place(i[0]))
             })
-            .expect("the edge crosses the row")
+            .expect("the edge crosses the picture")
     };
     crossing(0.75) - crossing(0.25)
 }
@@ -304,12 +332,14 @@ fn width_is_in_millimetres() {
         ("256x400, 20°", View::perspective([256, 400], 20.0)),
         ("orthographic", View::orthographic([256, 256], 5.0)),
     ] {
-        let width = edge_width_mm(view);
-        println!("{name}: {width:.4} mm, truth {truth:.4} mm");
-        assert!(
-            (width / truth - 1.0).abs() <= 0.01,
-            "{name}: {width} mm instead of {truth} mm"
-        );
+        for across in [DVec3::X, DVec3::Y] {
+            let width = edge_width_mm(view, across);
+            println!("{name}, across {across}: {width:.4} mm, truth {truth:.4} mm");
+            assert!(
+                (width / truth - 1.0).abs() <= 0.01,
+                "{name}, across {across}: {width} mm instead of {truth} mm"
+            );
+        }
     }
 }
 
@@ -386,6 +416,56 @@ fn an_off_centre_projection_gives_the_same() {
     }
     println!("differs by {worst:.6}");
     assert!(worst <= 2e-4, "{worst}");
+}
+
+#[test]
+fn two_frames_may_share_a_submission() {
+    // Two views through one effect, as a split screen has them.
+    let gpu = gpu();
+    let size = [64, 48];
+    let format = TextureFormat::Rgba32Float;
+    let view = View::orthographic(size, 2.0);
+    let edge: Vec<_> = (0..size[0] * size[1])
+        .map(|i| [f32::from(u8::from(i % size[0] >= 32)); 4])
+        .collect();
+    let irradiance = gpu.upload("irradiance", size, format, &edge);
+    let depth = gpu.upload(
+        "depth",
+        size,
+        TextureFormat::R32Float,
+        &vec![0.2f32; edge.len()],
+    );
+    let profile_id = gpu.upload(
+        "profile id",
+        size,
+        TextureFormat::R8Uint,
+        &vec![1u8; edge.len()],
+    );
+    let mut effect = ScreenSpace::new(&gpu.device, format).unwrap();
+    let mut record = |encoder: &mut wgpu::CommandEncoder, variance_mm2, output: &_| {
+        let frame = ScreenFrame {
+            irradiance: &irradiance,
+            depth: &depth,
+            profile_id: &profile_id,
+            output,
+            projection: view.projection.as_mat4(),
+            mm_per_unit: 1.0,
+            profiles: &[single_gaussian(variance_mm2)],
+        };
+        effect.prepare(&gpu.device, &frame).unwrap();
+        effect.render(encoder);
+    };
+    let outputs = [1.0, 9.0].map(|v| (v, gpu.target("output", size, format)));
+    gpu.run(|encoder| {
+        for (v, output) in &outputs {
+            record(encoder, *v, output);
+        }
+    });
+    for (v, output) in &outputs {
+        let alone = gpu.target("output", size, format);
+        gpu.run(|encoder| record(encoder, *v, &alone));
+        assert_eq!(gpu.read(output), gpu.read(&alone), "variance {v}");
+    }
 }
 
 #[test]

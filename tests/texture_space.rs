@@ -29,7 +29,6 @@ fn scatter(size: u32, profile: &Profile, texel: impl Fn(DVec2) -> Texel) -> Vec<
     let mut path = TextureSpace::new(&gpu.device, format).unwrap();
     path.prepare(
         &gpu.device,
-        &gpu.queue,
         &Atlas {
             irradiance: &gpu.upload("irradiance", [size; 2], format, &irradiance),
             positions: &gpu.upload("positions", [size; 2], format, &positions),

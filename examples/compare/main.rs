@@ -214,7 +214,8 @@ fn compare(options: &Options) -> Result<(), Error> {
     step("scattering in texture space");
     let mut unavailable = Vec::new();
     let mut modes = vec![none];
-    match scatter_texture(&gpu, &renderer, options) {
+    let atlas = AtlasRenderer::new(&gpu, &renderer, options.texture_size)?;
+    match scatter_texture(&gpu, &renderer, atlas, options) {
         Ok(texture) => modes.push(texture),
         Err(error) => unavailable.push(("texture space", error.to_string())),
     }
@@ -307,7 +308,6 @@ fn scatter_screen(
         let start = Instant::now();
         effect.prepare(
             &gpu.device,
-            &gpu.queue,
             &ScreenFrame {
                 irradiance,
                 depth,
@@ -331,9 +331,14 @@ fn scatter_screen(
     })
 }
 
-fn scatter_texture(gpu: &Gpu, renderer: &Renderer, options: &Options) -> Result<Scattered, Error> {
+/// Fails only where the model has no UVs for it.
+fn scatter_texture(
+    gpu: &Gpu,
+    renderer: &Renderer,
+    mut atlas: AtlasRenderer,
+    options: &Options,
+) -> Result<Scattered, Error> {
     let output = renderer.scattered_target(gpu);
-    let mut atlas = AtlasRenderer::new(gpu, renderer, options.texture_size)?;
     let (mut raster, mut blur, mut both) = (Vec::new(), Vec::new(), Vec::new());
     let timed = Instant::now();
     while more_runs(both.len(), timed) {
@@ -384,7 +389,7 @@ impl Frame {
         let skin: Vec<bool> = gpu
             .read_bytes(g.profile_id.texture())
             .iter()
-            .map(|id| *id != 0)
+            .map(|id| *id == 1) // the one profile
             .collect();
         let depth: Vec<f32> = bytemuck::pod_collect_to_vec(&gpu.read_bytes(g.depth.texture()));
         let inverse = camera
@@ -425,7 +430,7 @@ fn mm_per_texel(scene: &Scene, options: &Options) -> Vec<(String, f32)> {
     scene
         .primitives
         .iter()
-        .filter(|p| scene.materials[p.material].profile_id != 0)
+        .filter(|p| scene.materials[p.material].profile_id == 1)
         .map(|p| {
             let page = (0..p.pages.len()).max_by_key(|i| p.pages[*i].len());
             let texel = page.map_or(0.0, |page| p.texel_size(page, options.texture_size));

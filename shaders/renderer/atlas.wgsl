@@ -15,6 +15,9 @@ struct Atlas {
 @fragment
 fn fs_atlas(in: VertexOut) -> Atlas {
     let s = surface(in);
+    if s.alpha < material.alpha_cutoff {
+        discard;
+    }
     // Irradiance does not depend on the eye.
     let l = lit(in.world, s.normal, s.normal, 1.0, 0.0);
     return Atlas(vec4f(l.irradiance, 1.0), vec4f(in.world, f32(material.profile_id)));

@@ -6,7 +6,6 @@
 // [RH01] Ramamoorthi & Hanrahan 2001, "An efficient representation for irradiance environment maps".
 // [F05]  Fernando 2005, "Percentage-closer soft shadows".
 
-const MAX_LIGHTS = 4u;
 const PI = 3.14159265;
 
 struct Light {

@@ -145,7 +145,7 @@ fn surface(in: VertexOut) -> Surface {
     let footprint = sqrt(length(dpdx(mm)) * length(dpdy(mm)));
 
     let n = normalize(in.normal);
-    let t = normalize(in.tangent.xyz - n * dot(n, in.tangent.xyz) + vec3f(1e-20));
+    let t = normalize(in.tangent.xyz - n * dot(n, in.tangent.xyz) + vec3f(1e-10));
     let b = cross(n, t) * in.tangent.w;
     var normal = normalize(
         t * mapped.x * material.normal_scale + b * mapped.y * material.normal_scale + n * mapped.z,

@@ -167,7 +167,11 @@ impl AtlasRenderer {
         mm_per_unit: f32,
         output: &wgpu::TextureView,
     ) -> Result<AtlasTimes, Error> {
-        let skin = || renderer.meshes.iter().filter(|m| m.profile_id != 0);
+        let scatters = 1..=profiles.len();
+        let skin = || {
+            let meshes = renderer.meshes.iter();
+            meshes.filter(|m| scatters.contains(&m.profile_id.into()))
+        };
         if let Some(mesh) = skin().find(|m| m.pages.is_empty()) {
             return Err(Error::new(
                 format!("texture space: {}", mesh.name),
@@ -192,7 +196,6 @@ impl AtlasRenderer {
                 let start = Instant::now();
                 self.effect.prepare(
                     &gpu.device,
-                    &gpu.queue,
                     &Atlas {
                         irradiance: &self.irradiance,
                         positions: &self.positions,

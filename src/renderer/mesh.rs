@@ -7,6 +7,7 @@ use wgpu::util::DeviceExt;
 
 use super::scene::{Image, Scene, Vertex};
 use super::{Gpu, uniform_entry};
+use crate::Error;
 
 /// `Material` of the shader.
 #[repr(C)]
@@ -74,7 +75,14 @@ impl Mesh {
     }
 
     /// All primitives of a scene.
-    pub fn upload(gpu: &Gpu, scene: &Scene, layout: &wgpu::BindGroupLayout) -> Vec<Self> {
+    ///
+    /// # Errors
+    /// A primitive that is too large for a buffer.
+    pub fn upload(
+        gpu: &Gpu,
+        scene: &Scene,
+        layout: &wgpu::BindGroupLayout,
+    ) -> Result<Vec<Self>, Error> {
         let label = Some("subsurface::renderer mesh");
         let texture = |index: Option<usize>, format, default: [u8; 4]| {
             let plain = Image {
@@ -105,6 +113,15 @@ impl Mesh {
             .primitives
             .iter()
             .map(|primitive| {
+                let largest = size_of_val(&*primitive.vertices).max(4 * primitive.indices.len());
+                let limit = gpu.device.limits().max_buffer_size;
+                if largest as u64 > limit {
+                    return Err(Error::new(
+                        &primitive.name,
+                        format!("{largest} bytes of vertices or indices"),
+                        format!("at most {limit}"),
+                    ));
+                }
                 let material = &scene.materials[primitive.material];
                 let uniform = MaterialUniform {
                     base_color: material.base_color,
@@ -148,7 +165,7 @@ impl Mesh {
                         },
                     ],
                 });
-                Self {
+                Ok(Self {
                     name: primitive.name.clone(),
                     index_count: primitive.indices.len() as u32,
                     pages: primitive.pages.clone(),
@@ -162,7 +179,7 @@ impl Mesh {
                         bytemuck::cast_slice(&primitive.indices),
                         wgpu::BufferUsages::INDEX,
                     ),
-                }
+                })
             })
             .collect()
     }

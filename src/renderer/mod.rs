@@ -98,15 +98,21 @@ impl Renderer {
     /// Uploads a scene, for pictures of `size` pixels.
     ///
     /// # Errors
-    /// A size of 0 or beyond the device's limit.
+    /// A size of 0 or beyond the device's limits; a primitive that is too large for a buffer.
     pub fn new(gpu: &Gpu, scene: &Scene, size: [u32; 2]) -> Result<Self, Error> {
         let device = &gpu.device;
-        let limit = device.limits().max_texture_dimension_2d;
-        if size.iter().any(|&s| s == 0 || s > limit) {
+        let limits = device.limits();
+        let limit = limits.max_texture_dimension_2d;
+        // Pictures are read back as full floats, in rows of a multiple of 256 bytes.
+        let bytes = u64::from(size[0].div_ceil(16)) * 256 * u64::from(size[1]);
+        if size.iter().any(|&s| s == 0 || s > limit) || bytes > limits.max_buffer_size {
             return Err(Error::new(
                 "size",
                 format!("{}x{}", size[0], size[1]),
-                format!("1 to {limit} pixels each way"),
+                format!(
+                    "1 to {limit} pixels each way, {} in all",
+                    limits.max_buffer_size / 16
+                ),
             ));
         }
         let target = |name, format| gpu.target(name, size, format);
@@ -216,7 +222,7 @@ impl Renderer {
             &[PICTURE],
         );
         Ok(Self {
-            meshes: Mesh::upload(gpu, scene, &material_layout),
+            meshes: Mesh::upload(gpu, scene, &material_layout)?,
             bounds: scene.bounds(),
             size,
             gbuffer,

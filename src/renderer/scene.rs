@@ -1,7 +1,7 @@
 //! Scenes from glTF 2.0 files: triangles in world space, their materials and images.
 //!
 //! Read are the default scene's meshes, their first UV set, base colours, normal maps and alpha
-//! cut-outs. Left out are animation, skins and morph targets (a skinned mesh stands as modelled),
+//! cut-outs; every surface shows both sides. Left out are animation, skins and morph targets (a skinned mesh stands as modelled),
 //! cameras, lights, further UV sets and texture transforms. Nothing in a file is trusted: whatever
 //! is out of bounds, not finite or absurdly large is an [`Error`].
 
@@ -83,8 +83,6 @@ pub struct Material {
     pub roughness: f32,
     /// Alpha below this is cut out, in [0,1]; 0 for opaque surfaces. Blended ones are cut at 0.5.
     pub alpha_cutoff: f32,
-    /// Whether back faces are drawn as well.
-    pub double_sided: bool,
     /// Which scattering profile the surface has, 0 for none: the material's
     /// `extras.subsurface_profile`; failing that, 0 if its name starts with eye, teeth, tongue,
     /// lash, hair or brow, else 1.
@@ -469,7 +467,6 @@ impl Reader<'_> {
                 AlphaMode::Mask => from.alpha_cutoff().unwrap_or(0.5).clamp(0.0, 1.0),
                 AlphaMode::Blend => 0.5,
             },
-            double_sided: from.double_sided(),
             profile_id,
         };
         self.scene.materials.push(material);

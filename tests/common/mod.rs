@@ -4,7 +4,7 @@
 
 use std::sync::OnceLock;
 
-use glam::{DMat3, DMat4, DVec2, DVec3, DVec4, Mat4};
+use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 use subsurface::renderer::Gpu;
 use subsurface::wgpu::TextureFormat;
 use subsurface::{Profile, ScreenFrame, ScreenSpace};
@@ -165,7 +165,6 @@ impl GBuffer {
         effect
             .prepare(
                 &gpu.device,
-                &gpu.queue,
                 &ScreenFrame {
                     irradiance: &gpu.upload(
                         "irradiance",
@@ -356,11 +355,6 @@ pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     }
     assert!(n > 0, "nothing to take the mean of");
     (sum / f64::from(n)).sqrt()
-}
-
-/// The projection as a host hands it over.
-pub fn host(projection: DMat4) -> Mat4 {
-    projection.as_mat4()
 }
 
 /// Rotates the normal (0, 0, 1) by `tilt` about the image axis at `axis`, both in degrees.
