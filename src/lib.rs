@@ -1,4 +1,12 @@
 //! Subsurface scattering of skin as a post-process for wgpu renderers, after Li & Shao 2015.
+//!
+//! A deferred renderer hands its lit diffuse irradiance and its depth to [`ScreenSpace`] and gets
+//! the scattered irradiance back, to be multiplied by albedo. [`TextureSpace`] does the same over
+//! an atlas of a mesh, the way of the paper; it is the reference that the screen is compared with.
+//! Both blur by a [`Profile`], a sum of Gaussians with variances in mm².
+//!
+//! Features: `json` reads profiles from files; `renderer` is a small deferred renderer that plays
+//! the host in the examples and tests.
 
 mod error;
 mod gaussian_sum;
@@ -19,3 +27,8 @@ pub use wgpu;
 
 /// The most profiles that a frame can mix.
 pub const MAX_PROFILES: usize = 16;
+
+/// The code of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

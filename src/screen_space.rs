@@ -11,14 +11,16 @@ use crate::{Error, Profile};
 
 /// One frame of a deferred renderer, as [`ScreenSpace::prepare`] takes it.
 ///
-/// All textures are two-dimensional, single-sampled, of one size, and bound as a view of mip
-/// level 0.
+/// All textures are two-dimensional, single-sampled, and of one size; their views are of two
+/// dimensions, of mip level 0 and in the texture's own format, which wgpu leaves to the host to see
+/// to.
 #[derive(Clone, Copy, Debug)]
 pub struct ScreenFrame<'a> {
-    /// Lit diffuse irradiance E, linear RGB, *before* albedo, specular and tone mapping; four
-    /// float channels. Alpha is kept.
+    /// Lit diffuse irradiance E, linear and finite RGB, *before* albedo, specular and tone
+    /// mapping; three or four float channels. Alpha is kept.
     pub irradiance: &'a TextureView,
-    /// Depth as `projection` wrote it: a depth format (a depth-only view of it) or R32Float.
+    /// Depth as `projection` wrote it: a depth format of 24 bits or more, or R32Float. Of a format
+    /// that has stencil, too, the view must be depth-only.
     pub depth: &'a TextureView,
     /// Which of `profiles` a pixel scatters by, counted from 1; 0 where nothing scatters. One
     /// unsigned integer channel, such as R8Uint.
@@ -60,8 +62,8 @@ struct Settings {
 }
 
 impl ScreenSpace {
-    /// The effect for outputs of `output_format`, a renderable format with float channels such as
-    /// Rgba16Float.
+    /// The effect for outputs of `output_format`, a renderable format of three or four float
+    /// channels such as Rgba16Float.
     ///
     /// # Errors
     /// A format that cannot be rendered to on this device.

@@ -13,8 +13,9 @@ const GUTTER: i32 = 4;
 /// One surface unrolled into its UV space, as [`TextureSpace::prepare`] takes it.
 ///
 /// A surface that shares its UVs with another (or with itself) needs an atlas for each: a texel
-/// has room for one point. All textures are two-dimensional, single-sampled, of one size, and
-/// bound as a view of mip level 0.
+/// has room for one point. All textures are two-dimensional, single-sampled, and of one size; their
+/// views are of two dimensions, of mip level 0 and in the texture's own format, which wgpu leaves to
+/// the host to see to.
 #[derive(Clone, Copy, Debug)]
 pub struct Atlas<'a> {
     /// Lit diffuse irradiance E at each texel, linear RGB, before albedo; four float channels.
@@ -50,8 +51,8 @@ impl TextureSpace {
     /// position that draws a vertex at its place in the atlas.
     pub const VERTEX_WGSL: &str = include_str!("../shaders/texture_space.wgsl");
 
-    /// The effect for outputs of `output_format`, a renderable format with float channels such as
-    /// Rgba16Float.
+    /// The effect for outputs of `output_format`, a renderable format of three or four float
+    /// channels such as Rgba16Float.
     ///
     /// # Errors
     /// A format that cannot be rendered to on this device.
