@@ -18,7 +18,8 @@ const GUTTER: i32 = 4;
 /// the host to see to.
 #[derive(Clone, Copy, Debug)]
 pub struct Atlas<'a> {
-    /// Lit diffuse irradiance E at each texel, linear RGB, before albedo; four float channels.
+    /// Lit diffuse irradiance E at each texel, linear and finite RGB, before albedo; three or four
+    /// float channels.
     pub irradiance: &'a TextureView,
     /// Position of each texel's point in scene units, and in alpha the number of its profile in
     /// `profiles`, counted from 1; 0 where there is no surface. Rgba32Float; relative to the mesh

@@ -282,7 +282,7 @@ mod tests {
     use super::*;
     use bytemuck::Zeroable;
 
-    /// A grid of `n`×`n` squares at height `z` whose UVs are `uv(x, y)` for x and y in [0,1].
+    /// A grid of `n`×`n` squares at height `z` whose UVs are `uv(x, y)` for x and y 0 to 1.
     fn grid(n: u32, z: f32, uv: impl Fn(f32, f32) -> [f32; 2]) -> (Vec<Vertex>, Vec<u32>) {
         let vertex = |i: u32| {
             let (x, y) = (

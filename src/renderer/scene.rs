@@ -40,9 +40,9 @@ pub struct Vertex {
     pub tangent: [f32; 4],
     /// Coordinates in the material's textures, in units of a tile, v downwards; 0 if there are none.
     pub uv: [f32; 2],
-    /// Coordinates in the primitive's pages, in [0,1] and v downwards; 0 if there are no pages.
+    /// Coordinates in the primitive's pages, 0 to 1 and v downwards; 0 if there are no pages.
     pub atlas_uv: [f32; 2],
-    /// Where procedural skin has lips, redness, brows and pores, each in [0,1]; otherwise 0.
+    /// Where procedural skin has lips, redness, brows and pores, each 0 to 1; otherwise 0.
     pub mask: [f32; 4],
 }
 
@@ -70,7 +70,7 @@ pub struct Primitive {
 pub struct Material {
     /// The material's name, or its mesh's if it has none.
     pub name: String,
-    /// Linear colour and alpha in [0,1]; multiplies the texture.
+    /// Linear colour and alpha 0 to 1; multiplies the texture.
     pub base_color: [f32; 4],
     /// Index into [`Scene::images`], sRGB colour with linear alpha.
     pub base_color_texture: Option<usize>,
@@ -78,10 +78,10 @@ pub struct Material {
     pub normal_texture: Option<usize>,
     /// Multiplies the x and y of the normal map; 1 by default.
     pub normal_scale: f32,
-    /// glTF's roughness in [0,1], the square root of the micro-facets' slope; of skin, the
+    /// glTF's roughness 0 to 1, the square root of the micro-facets' slope; of skin, the
     /// lighting says it.
     pub roughness: f32,
-    /// Alpha below this is cut out, in [0,1]; 0 for opaque surfaces. Blended ones are cut at 0.5.
+    /// Alpha below this is cut out, 0 to 1; 0 for opaque surfaces. Blended ones are cut at 0.5.
     pub alpha_cutoff: f32,
     /// Which scattering profile the surface has, 0 for none: the material's
     /// `extras.subsurface_profile`; failing that, 0 if its name starts with eye, teeth, tongue,
