@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use wgpu::TextureFormat;
 
-use super::{Gpu, IRRADIANCE, Renderer, mesh::Mesh};
+use super::{Gpu, IRRADIANCE, Pipeline, Renderer, mesh::Mesh};
 use crate::{Atlas, Error, Profile, TextureSpace};
 
 /// The atlas of one page, used for one after the other.
@@ -58,18 +58,22 @@ impl AtlasRenderer {
                 .into(),
             ),
         });
-        let light = super::mesh_pipeline(
+        let light = super::pipeline(
             gpu,
-            "subsurface::renderer atlas",
-            &light_shader,
-            ["vs_atlas", "fs_atlas"],
-            &[
-                Some(&renderer.camera_layout),
-                Some(&renderer.material_layout),
-                Some(&renderer.lights.layout),
-            ],
-            &[IRRADIANCE, TextureFormat::Rgba32Float],
-            None,
+            Pipeline {
+                label: "subsurface::renderer atlas",
+                shader: &light_shader,
+                vertex: "vs_atlas",
+                fragment: "fs_atlas",
+                groups: &[
+                    Some(&renderer.camera_layout),
+                    Some(&renderer.material_layout),
+                    Some(&renderer.lights.layout),
+                ],
+                targets: &[IRRADIANCE, TextureFormat::Rgba32Float],
+                buffers: &[Mesh::VERTEX_LAYOUT],
+                depth_stencil: None,
+            },
         );
 
         let resample_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
@@ -104,18 +108,22 @@ impl AtlasRenderer {
                 .into(),
             ),
         });
-        let resample = super::mesh_pipeline(
+        let resample = super::pipeline(
             gpu,
-            "subsurface::renderer resample",
-            &resample_shader,
-            ["vs_screen", "fs_resample"],
-            &[
-                Some(&renderer.camera_layout),
-                Some(&renderer.material_layout),
-                Some(&resample_layout),
-            ],
-            &[IRRADIANCE],
-            Some(super::depth_state(wgpu::CompareFunction::Equal, false)),
+            Pipeline {
+                label: "subsurface::renderer resample",
+                shader: &resample_shader,
+                vertex: "vs_screen",
+                fragment: "fs_resample",
+                groups: &[
+                    Some(&renderer.camera_layout),
+                    Some(&renderer.material_layout),
+                    Some(&resample_layout),
+                ],
+                targets: &[IRRADIANCE],
+                buffers: &[Mesh::VERTEX_LAYOUT],
+                depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Equal, false)),
+            },
         );
 
         let target = |name, format| gpu.target(name, size, format);

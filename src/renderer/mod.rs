@@ -146,24 +146,28 @@ impl Renderer {
             })
         };
 
-        let draw = mesh_pipeline(
+        let draw = pipeline(
             gpu,
-            "subsurface::renderer gbuffer",
-            &module(
-                "subsurface::renderer gbuffer",
-                &[
-                    include_str!("../../shaders/renderer/material.wgsl"),
-                    include_str!("../../shaders/renderer/gbuffer.wgsl"),
+            Pipeline {
+                label: "subsurface::renderer gbuffer",
+                shader: &module(
+                    "subsurface::renderer gbuffer",
+                    &[
+                        include_str!("../../shaders/renderer/material.wgsl"),
+                        include_str!("../../shaders/renderer/gbuffer.wgsl"),
+                    ],
+                ),
+                vertex: "vs_screen",
+                fragment: "fs_gbuffer",
+                groups: &[Some(&camera_layout), Some(&material_layout)],
+                targets: &[
+                    TextureFormat::Rgba16Float,
+                    TextureFormat::Rgba16Float,
+                    TextureFormat::R8Uint,
                 ],
-            ),
-            ["vs_screen", "fs_gbuffer"],
-            &[Some(&camera_layout), Some(&material_layout)],
-            &[
-                TextureFormat::Rgba16Float,
-                TextureFormat::Rgba16Float,
-                TextureFormat::R8Uint,
-            ],
-            Some(depth_state(wgpu::CompareFunction::Greater, true)),
+                buffers: &[Mesh::VERTEX_LAYOUT],
+                depth_stencil: Some(depth_state(wgpu::CompareFunction::Greater, true)),
+            },
         );
 
         let (shade_layout, shade_group) = textures(
@@ -177,25 +181,30 @@ impl Renderer {
                 &gbuffer.depth,
             ],
         );
-        let shade = full_screen_pipeline(
+        let shade = pipeline(
             gpu,
-            "subsurface::renderer deferred",
-            &module(
-                "subsurface::renderer deferred",
-                &[
-                    include_str!("../../shaders/renderer/material.wgsl"),
-                    include_str!("../../shaders/renderer/lighting.wgsl"),
-                    include_str!("../../shaders/renderer/deferred.wgsl"),
+            Pipeline {
+                label: "subsurface::renderer deferred",
+                shader: &module(
+                    "subsurface::renderer deferred",
+                    &[
+                        include_str!("../../shaders/renderer/material.wgsl"),
+                        include_str!("../../shaders/renderer/lighting.wgsl"),
+                        include_str!("../../shaders/renderer/deferred.wgsl"),
+                    ],
+                ),
+                vertex: "vs_main",
+                fragment: "fs_lighting",
+                groups: &[
+                    Some(&camera_layout),
+                    None,
+                    Some(&lights.layout),
+                    Some(&shade_layout),
                 ],
-            ),
-            "fs_lighting",
-            &[
-                Some(&camera_layout),
-                None,
-                Some(&lights.layout),
-                Some(&shade_layout),
-            ],
-            &[IRRADIANCE, TextureFormat::Rgba16Float],
+                targets: &[IRRADIANCE, TextureFormat::Rgba16Float],
+                buffers: &[],
+                depth_stencil: None,
+            },
         );
 
         let compose_uniform = gpu.uniform::<ComposeUniform>("subsurface::renderer compose");
@@ -210,16 +219,21 @@ impl Renderer {
                 &gbuffer.depth,
             ],
         );
-        let compose = full_screen_pipeline(
+        let compose = pipeline(
             gpu,
-            "subsurface::renderer compose",
-            &module(
-                "subsurface::renderer compose",
-                &[include_str!("../../shaders/renderer/compose.wgsl")],
-            ),
-            "fs_compose",
-            &[Some(&compose_layout)],
-            &[PICTURE],
+            Pipeline {
+                label: "subsurface::renderer compose",
+                shader: &module(
+                    "subsurface::renderer compose",
+                    &[include_str!("../../shaders/renderer/compose.wgsl")],
+                ),
+                vertex: "vs_main",
+                fragment: "fs_compose",
+                groups: &[Some(&compose_layout)],
+                targets: &[PICTURE],
+                buffers: &[],
+                depth_stencil: None,
+            },
         );
         Ok(Self {
             meshes: Mesh::upload(gpu, scene, &material_layout)?,
@@ -452,63 +466,31 @@ fn color_attachment(
     }
 }
 
-/// A pipeline that draws meshes, both sides of their triangles.
-fn mesh_pipeline(
-    gpu: &Gpu,
-    label: &str,
-    shader: &wgpu::ShaderModule,
-    [vertex, fragment]: [&str; 2],
-    groups: &[Option<&wgpu::BindGroupLayout>],
-    targets: &[TextureFormat],
+/// What the renderer's pipelines differ in.
+struct Pipeline<'a> {
+    label: &'a str,
+    shader: &'a wgpu::ShaderModule,
+    /// Entry points.
+    vertex: &'a str,
+    fragment: &'a str,
+    groups: &'a [Option<&'a wgpu::BindGroupLayout>],
+    targets: &'a [TextureFormat],
+    /// Meshes, both sides of their triangles, or one triangle over the targets.
+    buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
     depth_stencil: Option<wgpu::DepthStencilState>,
-) -> wgpu::RenderPipeline {
-    pipeline(
-        gpu,
+}
+
+fn pipeline(gpu: &Gpu, parts: Pipeline) -> wgpu::RenderPipeline {
+    let Pipeline {
         label,
         shader,
-        [vertex, fragment],
+        vertex,
+        fragment,
         groups,
         targets,
-        &[Mesh::VERTEX_LAYOUT],
+        buffers,
         depth_stencil,
-    )
-}
-
-/// A pipeline that draws one triangle over its targets.
-fn full_screen_pipeline(
-    gpu: &Gpu,
-    label: &str,
-    shader: &wgpu::ShaderModule,
-    fragment: &str,
-    groups: &[Option<&wgpu::BindGroupLayout>],
-    targets: &[TextureFormat],
-) -> wgpu::RenderPipeline {
-    pipeline(
-        gpu,
-        label,
-        shader,
-        ["vs_main", fragment],
-        groups,
-        targets,
-        &[],
-        None,
-    )
-}
-
-#[expect(
-    clippy::too_many_arguments,
-    reason = "all that two kinds of pipeline differ in"
-)]
-fn pipeline(
-    gpu: &Gpu,
-    label: &str,
-    shader: &wgpu::ShaderModule,
-    [vertex, fragment]: [&str; 2],
-    groups: &[Option<&wgpu::BindGroupLayout>],
-    targets: &[TextureFormat],
-    buffers: &[Option<wgpu::VertexBufferLayout>],
-    depth_stencil: Option<wgpu::DepthStencilState>,
-) -> wgpu::RenderPipeline {
+    } = parts;
     let layout = gpu
         .device
         .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
