@@ -73,6 +73,7 @@ pub struct Renderer {
     shade: wgpu::RenderPipeline,
     shade_group: wgpu::BindGroup,
     compose: wgpu::RenderPipeline,
+    compose_uniform: wgpu::Buffer,
 }
 
 /// `Camera` of the shaders.
@@ -249,6 +250,7 @@ impl Renderer {
             shade,
             shade_group,
             compose,
+            compose_uniform,
         })
     }
 
@@ -327,9 +329,8 @@ impl Renderer {
         exposure: f32,
     ) -> Vec<[u8; 3]> {
         let picture = gpu.target("subsurface::renderer picture", self.size, PICTURE);
-        let uniform = gpu.uniform::<ComposeUniform>("subsurface::renderer compose");
         gpu.queue.write_buffer(
-            &uniform,
+            &self.compose_uniform,
             0,
             bytemuck::bytes_of(&ComposeUniform {
                 exposure,
@@ -340,7 +341,7 @@ impl Renderer {
         let (_, group) = textures(
             gpu,
             "subsurface::renderer compose",
-            Some(&uniform),
+            Some(&self.compose_uniform),
             &[diffuse, &g.albedo, &g.specular, &g.depth],
         );
         gpu.run(|encoder| {
