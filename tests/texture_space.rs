@@ -114,8 +114,9 @@ fn a_sphere_matches_eq_7() {
     });
     let red = rms(errors);
     println!("red RMS {red:.5}");
-    // As on the screen, where the surface is seen whole.
-    assert!(red <= 0.003, "{red}");
+    // .0009 measured: unlike on the screen nothing is hidden, and what is left is the two passes on
+    // a bent surface.
+    assert!(red <= 0.0015, "{red}");
 }
 
 #[test]
