@@ -57,11 +57,10 @@ pub struct Primitive {
     pub indices: Vec<u32>,
     /// Index into [`Scene::materials`].
     pub material: usize,
-    /// The indices of each UV page. On one page UV islands do not overlap, so that each surface
-    /// point has its own `atlas_uv`; only an island that overlaps itself cannot be helped. Empty
-    /// if the primitive has no UVs. See [`Primitive::texel_size`].
-    /// Islands may overlap by .5 % of their texels, one that overlaps itself is left as it is, and
-    /// what 63 pages leave over shares the last.
+    /// The indices of each UV page. On one page UV islands do not overlap, but for .5 % of their
+    /// texels, so that each surface point has its own `atlas_uv`; an island that overlaps itself
+    /// cannot be helped, and what 63 pages leave over shares the last. Empty if the primitive has
+    /// no UVs. See [`Primitive::texel_size`].
     pub pages: Vec<Range<u32>>,
     /// Whether the file gave a `_SKIN_MASK`, so that its skin is to be painted procedurally.
     pub procedural: bool,
