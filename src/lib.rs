@@ -6,7 +6,7 @@
 //! Both blur by a [`Profile`], a sum of Gaussians with variances in mm².
 //!
 //! Features: `json` reads profiles from files; `renderer` is a small deferred renderer that plays
-//! the host in the examples and tests.
+//! the host in the examples and tests; `truth` sums the integrals that all is measured against.
 
 mod error;
 mod gaussian_sum;
@@ -16,6 +16,8 @@ mod profile;
 pub mod renderer;
 mod screen_space;
 mod texture_space;
+#[cfg(feature = "truth")]
+pub mod truth;
 #[cfg(test)]
 mod wgsl;
 

@@ -4,6 +4,7 @@ mod common;
 
 use common::*;
 use glam::{DVec2, DVec3};
+use subsurface::truth::closed_form::{scattered_cosine, scattered_step, step};
 use subsurface::wgpu::TextureFormat;
 use subsurface::{Atlas, Profile, TextureSpace};
 

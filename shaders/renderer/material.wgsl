@@ -138,11 +138,28 @@ fn pores(mm: vec3f, footprint: f32) -> vec3f {
         + 0.05 * coarse.xyz * resolved(1.3 * 2.0, footprint);
 }
 
+// What a pixel covers of the surface, each way.
+struct Footprint {
+    // Geometric mean of its sides, in mm.
+    mm: f32,
+    // Its sides in the textures.
+    duv_dx: vec2f,
+    duv_dy: vec2f,
+}
+
 fn surface(in: VertexOut) -> Surface {
-    let base = material.base_color * textureSample(base_color_map, material_sampler, in.uv);
-    let mapped = textureSample(normal_map, material_sampler, in.uv).xyz * 2.0 - 1.0;
     let mm = in.world * camera.mm_per_unit;
     let footprint = sqrt(length(dpdx(mm)) * length(dpdy(mm)));
+    return surface_over(in, Footprint(footprint, dpdx(in.uv), dpdy(in.uv)));
+}
+
+fn surface_over(in: VertexOut, footprint: Footprint) -> Surface {
+    let dx = footprint.duv_dx;
+    let dy = footprint.duv_dy;
+    let base = material.base_color
+        * textureSampleGrad(base_color_map, material_sampler, in.uv, dx, dy);
+    let mapped = textureSampleGrad(normal_map, material_sampler, in.uv, dx, dy).xyz * 2.0 - 1.0;
+    let mm = in.world * camera.mm_per_unit;
 
     let n = normalize(in.normal);
     let t = normalize(in.tangent.xyz - n * dot(n, in.tangent.xyz) + vec3f(1e-10));
@@ -152,8 +169,8 @@ fn surface(in: VertexOut) -> Surface {
     );
     var albedo = base.rgb;
     if material.procedural != 0u {
-        albedo = procedural_skin(mm, in.mask, albedo, footprint);
-        let slope = pores(mm, footprint) * in.mask.w;
+        albedo = procedural_skin(mm, in.mask, albedo, footprint.mm);
+        let slope = pores(mm, footprint.mm) * in.mask.w;
         normal = normalize(normal - (slope - normal * dot(normal, slope)));
     }
     return Surface(albedo, base.a, normal);

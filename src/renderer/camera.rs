@@ -97,6 +97,20 @@ impl Camera {
         perspective_infinite_reverse(self.fov_y, aspect, near)
     }
 
+    /// Width and height, in scene units, of what a pixel covers of a surface at `point`, in world
+    /// space, whose unit normal is `normal`; up to ten times as much as of one that faces it.
+    pub fn footprint(&self, size: [u32; 2], point: Vec3, normal: Vec3) -> [f32; 2] {
+        let view = self.view();
+        let p = view.transform_point3(point);
+        let n = view.transform_vector3(normal);
+        let ray = p / p.z.abs().max(f32::MIN_POSITIVE);
+        let facing = n.dot(ray);
+        let facing = facing.abs().max(0.1 * ray.length()).copysign(facing);
+        // A pixel of a plane through the point that faces the camera.
+        let step = 2.0 * p.z.abs() * (self.fov_y / 2.0).tan() / size[1] as f32;
+        [Vec3::X, Vec3::Y].map(|axis| step * (axis - ray * (n.dot(axis) / facing)).length())
+    }
+
     /// Pixels per scene unit at the target.
     pub fn px_per_unit(&self, size: [u32; 2]) -> f32 {
         let height = 2.0 * self.eye.distance(self.target) * (self.fov_y / 2.0).tan();

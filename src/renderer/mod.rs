@@ -11,12 +11,14 @@ mod gpu;
 mod lighting;
 mod mesh;
 mod pages;
+mod probe;
 mod scene;
 
 pub use atlas::{AtlasRenderer, AtlasTimes};
 pub use camera::{Camera, View};
 pub use gpu::Gpu;
 pub use lighting::{Light, Lighting, Sky, Specular};
+pub use probe::Probe;
 pub use scene::{Image, Material, Primitive, Scene, Vertex};
 
 use bytemuck::{Pod, Zeroable};

@@ -1,11 +1,12 @@
 //! What the tests share: one device, synthetic G-buffers with exact points and areas, the effect
-//! over them, and oracles that use no code of the effect.
+//! and the truth over them.
 #![allow(dead_code)] // Each test binary uses a part of this.
 
 use std::sync::OnceLock;
 
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 use subsurface::renderer::Gpu;
+use subsurface::truth::{self, Patch, Pixel};
 use subsurface::wgpu::TextureFormat;
 use subsurface::{Profile, ScreenFrame, ScreenSpace};
 
@@ -185,25 +186,31 @@ impl GBuffer {
         gpu.read(&output)
     }
 
-    /// The visible integral at one pixel, per Gaussian normalised: every pixel, summed exactly,
-    /// by weights that spread by v on the pixels' lattice.
-    pub fn visible_sum(&self, pixel: usize, profile: &Profile) -> DVec3 {
-        let here = self.hits[pixel].expect("the visible integral is asked for on the surface");
-        let mut result = DVec3::ZERO;
-        for g in profile.gaussians() {
-            let v = lattice_variance(g.variance_mm2.into(), self.pixels_mm2[pixel]);
-            let (mut light, mut mass) = (DVec3::ZERO, 0.0);
-            for (hit, area) in self.hits.iter().zip(&self.areas) {
-                if let Some(there) = hit.filter(|h| h.id == here.id) {
-                    let r2 = there.point.distance_squared(here.point);
-                    let share = area * (-r2 / (2.0 * v)).exp();
-                    light += share * there.irradiance;
-                    mass += share;
-                }
-            }
-            result += g.weight.as_dvec3() * light / mass;
-        }
-        result
+    /// The visible integral at some pixels, all of which have the id 1.
+    pub fn visible_integral(&self, asked: &[usize], profile: &Profile) -> Vec<DVec3> {
+        let on_surface = self.pixels(|h| h.id == 1);
+        let pixels: Vec<Pixel> = on_surface
+            .iter()
+            .map(|(i, hit)| Pixel {
+                patch: Patch {
+                    // From what is looked at, which leaves single floats their digits.
+                    point_mm: (hit.point - on_surface[0].1.point).as_vec3(),
+                    area_mm2: self.areas[*i] as f32,
+                    irradiance: hit.irradiance.as_vec3(),
+                },
+                facing_mm2: self.pixels_mm2[*i] as f32,
+            })
+            .collect();
+        let place = |i| on_surface.partition_point(|(j, _)| j < i);
+        let asked: Vec<usize> = asked.iter().map(place).collect();
+        let sums = truth::visible_integral(&pixels, &asked, profile, &|_| ());
+        sums.iter().map(|s| s.as_dvec3()).collect()
+    }
+
+    /// Differences of `out`, the whole picture scattered by skin, to the visible integral.
+    pub fn errors(&self, out: &[DVec3], asked: &[usize]) -> Vec<DVec3> {
+        let truth = self.visible_integral(asked, &Profile::SKIN);
+        asked.iter().zip(truth).map(|(i, t)| out[*i] - t).collect()
     }
 
     /// Pixels for which `select` holds, with what they see.
@@ -255,95 +262,6 @@ pub fn sphere(
             }
         })
     }
-}
-
-/// The step edge at x mm, blurred by a Gaussian of this variance.
-pub fn step(x_mm: f64, variance_mm2: f64) -> f64 {
-    if variance_mm2 == 0.0 {
-        return if x_mm > 0.0 { 1.0 } else { 0.0 };
-    }
-    0.5 * (1.0 + libm::erf(x_mm / (2.0 * variance_mm2).sqrt()))
-}
-
-/// That edge, scattered by a profile.
-pub fn scattered_step(x_mm: f64, blur_mm2: f64, profile: &Profile) -> DVec3 {
-    profile
-        .gaussians()
-        .iter()
-        .map(|g| g.weight.as_dvec3() * step(x_mm, f64::from(g.variance_mm2) + blur_mm2))
-        .sum()
-}
-
-/// max(cos θ, 0) on a sphere, scattered by a profile by chord distance: Eq. 7 in closed form. A
-/// Gaussian of the chord is a von Mises–Fisher kernel, which scales the l-th Legendre coefficient
-/// by I_{l+½}(κ)/I_{½}(κ), κ = ρ²/v.
-pub fn scattered_cosine(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -> DVec3 {
-    const TERMS: usize = 1500;
-    let mut p_at_0 = 1.0;
-    let mut coefficients = vec![0.0; TERMS];
-    coefficients[0] = 0.25;
-    coefficients[1] = 0.5;
-    for l in (2..TERMS).step_by(2) {
-        let n = l as f64;
-        p_at_0 *= -(n - 1.0) / n;
-        // ∫₀¹ x P_l dx = −P_l(0)/((l−1)(l+2)).
-        coefficients[l] = (2.0 * n + 1.0) / 2.0 * -p_at_0 / ((n - 1.0) * (n + 2.0));
-    }
-    let mut scattered = vec![DVec3::ZERO; TERMS];
-    for g in profile.gaussians() {
-        let kappa = rho_mm * rho_mm / f64::from(g.variance_mm2);
-        // The ratio I_{l+½}/I_{l−½} by its continued fraction, from far above.
-        let mut ratio = 0.0;
-        let mut ratios = vec![0.0; TERMS];
-        for l in (1..TERMS + 20_000).rev() {
-            ratio = 1.0 / ((2 * l + 1) as f64 / kappa + ratio);
-            if l < TERMS {
-                ratios[l] = ratio;
-            }
-        }
-        let mut factor = 1.0;
-        for l in 0..TERMS {
-            if l > 0 {
-                factor *= ratios[l];
-            }
-            scattered[l] += g.weight.as_dvec3() * factor * coefficients[l];
-        }
-    }
-    move |cos_theta| {
-        let (mut p0, mut p1) = (1.0, cos_theta);
-        let mut sum = scattered[0] + scattered[1] * p1;
-        for (l, s) in scattered.iter().enumerate().skip(2) {
-            let n = l as f64;
-            let p = ((2.0 * n - 1.0) * cos_theta * p1 - (n - 1.0) * p0) / n;
-            (p0, p1) = (p1, p);
-            sum += *s * p;
-        }
-        sum
-    }
-}
-
-/// The variance whose point weights exp(−n²/2s) spread by `variance` on a lattice of cells of
-/// this area: by bisection of their second moment.
-pub fn lattice_variance(variance: f64, cell: f64) -> f64 {
-    let spread = |s: f64| {
-        let weight = |n: i32| (-f64::from(n * n) / (2.0 * s)).exp();
-        let sum = |f: &dyn Fn(i32) -> f64| (-20..=20).map(|n| f(n) * weight(n)).sum::<f64>();
-        sum(&|n| f64::from(n * n)) / sum(&|_| 1.0)
-    };
-    let wanted = variance / cell;
-    if wanted > 1.0 {
-        return variance; // The lattice no longer matters: 1e-6 at 1 px².
-    }
-    let (mut low, mut high) = (1e-4, 2.0);
-    for _ in 0..60 {
-        let middle = (low + high) / 2.0;
-        if spread(middle) < wanted {
-            low = middle
-        } else {
-            high = middle
-        }
-    }
-    low * cell
 }
 
 /// Root mean square.
