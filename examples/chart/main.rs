@@ -15,6 +15,7 @@ mod label;
 mod output;
 #[path = "../shared/page.rs"]
 mod page;
+mod panel;
 mod plot;
 mod report;
 mod row;

@@ -9,7 +9,7 @@ use crate::files::Chart;
 use crate::page::{address, escape, head, line};
 use crate::row::Row;
 use crate::scale::rounded;
-use crate::style::styles;
+use crate::style::{distinct, styles};
 
 /// The pictures of a scene.
 pub struct SceneImages {
@@ -39,10 +39,15 @@ const COLUMNS: [Column; 13] = [
         |row| row.max_error_visible,
         rounded,
     ),
-    ("RMSE, Eq. 7", "%", |row| row.rel_rmse_eq7, percent),
-    ("Largest, Eq. 7", "linear", |row| row.max_error_eq7, rounded),
+    ("RMSE, Eq.\u{a0}7", "%", |row| row.rel_rmse_eq7, percent),
     (
-        "RMSE, Eq. 7 normalised",
+        "Largest, Eq.\u{a0}7",
+        "linear",
+        |row| row.max_error_eq7,
+        rounded,
+    ),
+    (
+        "RMSE, Eq.\u{a0}7, normalised",
         "%",
         |row| row.rel_rmse_eq7_normalised,
         percent,
@@ -111,14 +116,14 @@ pub fn html<'a>(chart: &Chart, drawings: impl Iterator<Item = &'a str>) -> Image
 fn tables(page: &mut String, rows: &[Row]) {
     line(page, "<h2>Numbers</h2>");
     let styles = styles(rows.iter().map(|row| row.method.as_str()));
-    for rows in rows.chunk_by(|a, b| a.scene == b.scene) {
+    for scene in distinct(rows.iter().map(|row| row.scene.as_str())) {
+        let rows: Vec<&Row> = rows.iter().filter(|row| row.scene == scene).collect();
         let Row {
-            scene,
             width,
             height,
             px_per_mm,
             ..
-        } = &rows[0];
+        } = rows[0];
         let (scene, px_per_mm) = (escape(scene), rounded(*px_per_mm));
         line(
             page,

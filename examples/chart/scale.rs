@@ -6,10 +6,15 @@ pub struct Scale {
     /// Decimal logarithms of the least and the greatest value.
     low: f64,
     high: f64,
-    /// Where these two lie on the drawing.
+    /// Whether 0 is among the values: it has the lower end of the axis to itself.
+    has_zero: bool,
+    /// Where the ends lie on the drawing.
     start: f64,
     end: f64,
 }
+
+/// Left free at each end, as a part of what is between.
+const ROOM: f64 = 0.08;
 
 /// A line of the grid.
 #[derive(Debug, PartialEq)]
@@ -21,20 +26,25 @@ pub struct Tick {
 }
 
 impl Scale {
-    /// Has room for all `values` that a logarithm has, and a little more. Spans at least a decade,
+    /// Has room for all `values` that have a logarithm, and a little more. Spans at least a decade,
     /// so that a difference that is nothing does not look like one.
     pub fn over(values: impl Iterator<Item = f64>) -> Self {
-        let logs = values
-            .filter(|value| value.is_finite() && *value > 0.0)
-            .map(f64::log10);
-        let (low, high) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), log| {
-            (low.min(log), high.max(log))
-        });
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        let mut has_zero = false;
+        for value in values.filter(|value| value.is_finite()) {
+            if value > 0.0 {
+                low = low.min(value.log10());
+                high = high.max(value.log10());
+            } else {
+                has_zero = true;
+            }
+        }
         let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
-        let room = (0.08 * (high - low)).max((1.0 - (high - low)) / 2.0);
+        let room = (ROOM * (high - low)).max((1.0 - (high - low)) / 2.0);
         Self {
             low: low - room,
             high: high + room,
+            has_zero,
             start: 0.0,
             end: 1.0,
         }
@@ -52,12 +62,21 @@ impl Scale {
         self.start + part * (self.end - self.start)
     }
 
-    /// The grid: every power of ten, and between them the multiples.
+    /// The grid: every power of ten, between them the multiples, and 0 where it is among the values.
     pub fn ticks(&self) -> Vec<Tick> {
         let span = self.high - self.low;
         // Labels a decade apart where there are few, further apart where there are many.
         let step = (span / 7.0).ceil() as i32;
         let mut ticks = Vec::new();
+        let mut least = self.low;
+        if self.has_zero {
+            // Next to it there is no room for another label.
+            least += ROOM * span;
+            ticks.push(Tick {
+                value: 0.0,
+                label: Some("0".into()),
+            });
+        }
         for power in self.low.floor() as i32..=self.high.floor() as i32 {
             for digit in 1..=9 {
                 let log = f64::from(power) + f64::from(digit).log10();
@@ -67,7 +86,7 @@ impl Scale {
                     _ => false,
                 };
                 let is_shown = digit == 1 || span < 7.0;
-                if is_shown && (self.low..=self.high).contains(&log) {
+                if is_shown && (least..=self.high).contains(&log) {
                     let value = f64::from(digit) * 10f64.powi(power);
                     ticks.push(Tick {
                         value,
@@ -138,6 +157,13 @@ mod tests {
             assert!(!scale.ticks().is_empty());
             assert!((0.0..=1.0).contains(&scale.place(2.0)));
         }
+    }
+
+    #[test]
+    fn zero_has_a_place_of_its_own() {
+        let ticks = Scale::over([0.0, 0.01, 10.0].into_iter()).ticks();
+        assert_eq!(ticks[0].label.as_deref(), Some("0"));
+        assert!(ticks[1..].iter().all(|tick| tick.value > 0.0));
     }
 
     #[test]

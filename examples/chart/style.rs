@@ -86,15 +86,20 @@ const fn style(
     }
 }
 
-/// The styles of some methods, each once: the known ones first, then others as they come.
-pub fn styles<'a>(methods: impl Iterator<Item = &'a str>) -> Vec<Style<'a>> {
-    let mut names: Vec<&str> = Vec::new();
-    for method in methods {
-        if !names.contains(&method) {
-            names.push(method);
+/// Each name once, in the order that they come in.
+pub fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut once = Vec::new();
+    for name in names {
+        if !once.contains(&name) {
+            once.push(name);
         }
     }
-    let (known, others): (Vec<_>, Vec<_>) = names
+    once
+}
+
+/// The styles of some methods, each once: the known ones first, then others as they come.
+pub fn styles<'a>(methods: impl Iterator<Item = &'a str>) -> Vec<Style<'a>> {
+    let (known, others): (Vec<_>, Vec<_>) = distinct(methods)
         .into_iter()
         .partition(|name| METHODS.iter().any(|style| style.method == *name));
     let known = METHODS

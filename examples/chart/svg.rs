@@ -39,6 +39,36 @@ pub struct Type<'a> {
     pub code: bool,
 }
 
+impl<'a> Stroke<'a> {
+    pub const fn new(color: &'a str, width: f64) -> Self {
+        Self {
+            color,
+            width,
+            dashes: "",
+        }
+    }
+
+    pub fn dashed(self, dashes: &'a str) -> Self {
+        Self { dashes, ..self }
+    }
+}
+
+impl<'a> Type<'a> {
+    pub const fn new(color: &'a str, size: f64) -> Self {
+        Self {
+            size,
+            color,
+            anchor: "start",
+            upwards: false,
+            code: false,
+        }
+    }
+
+    pub fn anchored(self, anchor: &'a str) -> Self {
+        Self { anchor, ..self }
+    }
+}
+
 /// A shape that stands for a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Marker {
@@ -80,6 +110,9 @@ impl Svg {
 
     /// A text, with its baseline at a point, on a halo that keeps it legible on lines.
     pub fn text(&mut self, [x, y]: Point, text: &str, set: Type) {
+        if text.is_empty() {
+            return;
+        }
         let Type {
             size,
             color,
@@ -177,7 +210,7 @@ fn path(points: &[Point]) -> String {
 
 /// About how wide a text is, without asking the font.
 pub fn text_width(text: &str, set: Type) -> f64 {
-    let letter = if set.code { 0.61 } else { 0.52 };
+    let letter = if set.code { 0.61 } else { 0.56 };
     letter * set.size * text.chars().count() as f64
 }
 
@@ -228,14 +261,6 @@ impl Rasteriser {
 mod tests {
     use super::*;
 
-    const TYPE: Type = Type {
-        size: 20.0,
-        color: "#000",
-        anchor: "start",
-        upwards: false,
-        code: false,
-    };
-
     fn picture(svg: Svg) -> RgbImage {
         let svg = svg.finish(80.0, 40.0, "a < b");
         Rasteriser::new().picture(&svg).unwrap()
@@ -259,7 +284,7 @@ mod tests {
         let mut least = 0;
         for text in ["<", "<&", "<&σ", "<&σ×", "<&σ×Δ", "<&σ×Δ−"] {
             let mut svg = Svg::default();
-            svg.text([5.0, 30.0], text, TYPE);
+            svg.text([5.0, 30.0], text, Type::new("#000", 20.0));
             let ink = ink(&picture(svg));
             assert!(ink > least, "{text}");
             least = ink;
