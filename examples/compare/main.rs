@@ -6,6 +6,10 @@
 //! ```
 
 mod metrics;
+#[path = "../shared/output.rs"]
+mod output;
+#[path = "../shared/page.rs"]
+mod page;
 mod report;
 
 use std::path::PathBuf;
@@ -271,7 +275,7 @@ fn compare(options: &Options) -> Result<(), Error> {
     step("writing the report");
     let files = files(&report, &measured.layers)
         .map_err(|e| Error::new("report", format!("\"{e}\""), "pictures that can be encoded"))?;
-    report::write(&options.out, &files).map_err(|e| {
+    output::write(&options.out, &files).map_err(|e| {
         Error::new(
             "--out",
             format!("\"{e}\""),
@@ -570,7 +574,7 @@ fn files(
         ];
         for (what, picture) in pictures {
             if let Some(picture) = picture {
-                files.push((format!("{}_{what}.png", mode.name), report::png(picture)?));
+                files.push((format!("{}_{what}.png", mode.name), output::png(picture)?));
             }
         }
     }

@@ -1,18 +1,14 @@
 //! What the comparison found, told four ways: `report.json` for programs, `report.html` and the
 //! pictures for people, a table for the terminal.
 
-use std::io::{self, Cursor};
-use std::path::Path;
-use std::{fs, process};
+use std::io::Cursor;
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD as BASE64;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::error::{ParameterError, ParameterErrorKind};
 use image::{ImageError, ImageFormat, ImageResult, Rgb32FImage, RgbImage};
 use serde_json::{Map, Value, json};
 
 use crate::metrics::{Layer, PIXELS_PER_DEGREE};
+use crate::page::{address, escape, head, line};
 
 /// How much the difference pictures are amplified.
 pub const DIFFERENCE_GAIN: f32 = 10.0;
@@ -338,13 +334,9 @@ pub fn table(report: &Report) -> String {
 /// # Errors
 /// A picture that cannot be encoded as PNG.
 pub fn html(report: &Report) -> ImageResult<String> {
-    let title = escape(&report.model);
-    let mut page = format!(
-        "<!doctype html>\n<html lang=en>\n<meta charset=utf-8>\n\
-         <meta name=viewport content=\"width=device-width, initial-scale=1\">\n\
-         <title>{title}: skin with and without scattering</title>\n<style>{STYLE}</style>\n\
-         <main>\n<h1>Skin with and without scattering</h1>\n"
-    );
+    let title = format!("{}: skin with and without scattering", report.model);
+    let mut page = head(&title, STYLE);
+    line(&mut page, "<h1>Skin with and without scattering</h1>");
     if let Some(headline) = headline(report) {
         line(
             &mut page,
@@ -464,12 +456,12 @@ fn pictures(page: &mut String, report: &Report, views: &[&View]) -> ImageResult<
                 continue;
             };
             let (id, caption) = (mode.name, escape(mode.title));
-            let data = BASE64.encode(png(picture)?);
+            let address = address(picture)?;
             line(
                 page,
                 &format!(
                     "<figure><img data-mode={id} data-layer={} alt=\"{title}: {caption}\" \
-                     src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption></figure>",
+                     src=\"{address}\"><figcaption>{caption}</figcaption></figure>",
                     view.name
                 ),
             );
@@ -553,34 +545,6 @@ fn indented(figure: &Figure) -> String {
     format!("{}{}", if figure.part { "  " } else { "" }, figure.name)
 }
 
-/// Adds a line without trailing blanks.
-fn line(text: &mut String, line: &str) {
-    text.push_str(line.trim_end());
-    text.push('\n');
-}
-
-/// Text as HTML shows it, between tags or in a quoted attribute.
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
-        .replace('\'', "&#39;")
-}
-
-/// An sRGB picture as a PNG file.
-///
-/// # Errors
-/// A picture without pixels.
-pub fn png(picture: &RgbImage) -> ImageResult<Vec<u8>> {
-    let mut file = Vec::new();
-    // The encoder's default is made for speed; the report carries a dozen of these.
-    let encoder =
-        PngEncoder::new_with_quality(&mut file, CompressionType::Default, FilterType::Adaptive);
-    picture.write_with_encoder(encoder)?;
-    Ok(file)
-}
-
 /// A linear layer as an OpenEXR file, RGB in 32-bit floats.
 ///
 /// # Errors
@@ -598,69 +562,10 @@ pub fn exr(layer: &Layer) -> ImageResult<Vec<u8>> {
     Ok(file.into_inner())
 }
 
-/// Writes named files into the directory `out`, all or none: they are moved into place only when
-/// every one is on disk, in the order given. Makes `out` where it is missing, replaces files of
-/// the same names and leaves others alone.
-///
-/// # Errors
-/// Whatever keeps a file from being written, with the path that it happened to.
-pub fn write(out: &Path, files: &[(String, Vec<u8>)]) -> io::Result<()> {
-    let is_new = !out.exists();
-    // Inside `out`, not beside it: a move within one directory never crosses file systems, and
-    // the directory above may not be ours to write to.
-    let staging = out.join(format!(".compare-{}", process::id()));
-    let result = stage(&staging, out, files);
-    // What is left here is of no use to anyone, and the first error says what went wrong.
-    let _ = fs::remove_dir_all(&staging);
-    if is_new && result.is_err() {
-        let _ = fs::remove_dir(out);
-    }
-    result
-}
-
-fn stage(staging: &Path, out: &Path, files: &[(String, Vec<u8>)]) -> io::Result<()> {
-    let at = |path: &Path, error: io::Error| {
-        io::Error::new(error.kind(), format!("{}: {error}", path.display()))
-    };
-    // An interrupted run may have left one behind under the same process id.
-    let _ = fs::remove_dir_all(staging);
-    if out.exists() && !out.is_dir() {
-        return Err(at(out, io::ErrorKind::NotADirectory.into()));
-    }
-    fs::create_dir_all(out).map_err(|error| at(out, error))?;
-    fs::create_dir(staging).map_err(|error| at(staging, error))?;
-    for (name, bytes) in files {
-        let target = out.join(name);
-        if target.is_dir() {
-            return Err(at(&target, io::ErrorKind::IsADirectory.into()));
-        }
-        fs::write(staging.join(name), bytes).map_err(|error| at(&target, error))?;
-    }
-    for (name, _) in files {
-        let target = out.join(name);
-        fs::rename(staging.join(name), &target).map_err(|error| at(&target, error))?;
-    }
-    Ok(())
-}
-
-// Pictures lie on 18 % grey (sRGB 118), so that neither their colours nor their brightness are
-// judged against the page.
 const STYLE: &str = "
-:root { color-scheme: dark; --page: #262626; --text: #e4e4e4; --dim: #a8a8a8; --rule: #444; }
-* { box-sizing: border-box; }
-body { margin: 0; background: var(--page); color: var(--text); font: 16px/1.5 system-ui, sans-serif; }
-main { max-width: 68rem; margin: auto; padding: clamp(1rem, 4vw, 2.5rem); }
-h1 { margin: 0 0 .5rem; font-size: clamp(1.5rem, 4vw, 2.2rem); font-weight: 600; line-height: 1.2; }
-h2 { margin: 3rem 0 .75rem; font-size: 1.3rem; font-weight: 600; }
-h3 { margin: 1.5rem 0 0; font-size: 1rem; font-weight: 600; }
-h3 + p { margin: 0 0 .5rem; color: var(--dim); font-size: .9rem; }
-.lead { margin: 0 0 1.5rem; max-width: 46rem; }
-.note { margin: 0 0 1.5rem; padding-left: .75rem; border-left: 3px solid #c9a24a; color: var(--dim); }
 .controls { display: flex; flex-wrap: wrap; justify-content: space-between; gap: .5rem 1rem; margin-bottom: .75rem; }
 .controls label { color: var(--dim); font-size: .9rem; }
 select { font: inherit; color: var(--text); background: #3a3a3a; border: 1px solid #5a5a5a; border-radius: 4px; padding: .3rem .4rem; }
-.mat { background: #767676; padding: clamp(.5rem, 2.5vw, 1.75rem); border-radius: 4px; }
-img { display: block; width: 100%; image-rendering: auto; }
 #frame { --at: 50%; position: relative; overflow: hidden; margin: auto; aspect-ratio: var(--w) / var(--h);
   width: min(100%, 84vh * var(--w) / var(--h), max(1px * var(--w), 48rem));
   cursor: ew-resize; user-select: none; -webkit-user-select: none; touch-action: pan-y; }
@@ -676,22 +581,10 @@ img { display: block; width: 100%; image-rendering: auto; }
 #frame b { bottom: .6rem; padding: .15rem .55rem; border-radius: 3px; background: #000b; color: #fff; font-size: .85rem; font-weight: 500; }
 #left-tag { left: .6rem; }
 #right-tag { right: .6rem; }
-table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
-th, td { padding: .45rem 0 .45rem clamp(.5rem, 3vw, 2rem); border-bottom: 1px solid var(--rule); vertical-align: top; text-align: right; font-weight: 400; }
-thead th { vertical-align: bottom; font-weight: 600; font-size: .9rem; line-height: 1.25; }
-th[scope=row] { padding-left: 0; text-align: left; }
-th span { color: var(--dim); font-size: .85rem; }
-th small { display: block; max-width: 34rem; color: var(--dim); font-size: .8rem; line-height: 1.35; }
 .part th[scope=row] { padding-left: 1.25rem; }
-.strip { display: flex; gap: clamp(.4rem, 1.5vw, 1rem); padding-bottom: .6rem; }
-figure { flex: 1 1 0; min-width: 0; margin: 0; }
-figcaption { margin-top: .3rem; color: #fff; font-size: .85rem; line-height: 1.25; text-align: center; }
 .magma { display: inline-block; width: 6rem; height: .8em; vertical-align: -.05em; border-radius: 2px;
   background: linear-gradient(90deg, #000004, #3b0f70, #8c2981, #de4968, #fe9f6d, #fcfdbf); }
-dl { display: grid; grid-template-columns: max-content 1fr; gap: .2rem 1.25rem; margin: 0; font-size: .9rem; }
-dt { color: var(--dim); }
-dd { margin: 0; overflow-wrap: anywhere; }
-@media (max-width: 34rem) { body { font-size: 15px; } td, thead th { font-size: .8rem; } .part th[scope=row] { padding-left: .6rem; } }
+@media (max-width: 34rem) { .part th[scope=row] { padding-left: .6rem; } }
 ";
 
 // The range input is the divider for the keyboard and for screen readers, whole percents; the
@@ -847,9 +740,9 @@ mod tests {
         let html = html(&report).unwrap();
         assert!(!html.contains("http:") && !html.contains("https:") && !html.contains("url("));
         for mode in &report.modes {
-            let data = BASE64.encode(png(&mode.picture).unwrap());
+            let address = address(&mode.picture).unwrap();
             assert!(
-                html.contains(&format!("src=\"data:image/png;base64,{data}\"")),
+                html.contains(&format!("src=\"{address}\"")),
                 "{}",
                 mode.name
             );
@@ -899,78 +792,5 @@ mod tests {
             .into_rgb32f();
         assert_eq!(read.as_raw(), layer.pixels.as_flattened());
         assert!(exr(&Layer { width: 3, ..layer }).is_err());
-
-        let picture = RgbImage::from_fn(5, 4, |x, y| image::Rgb([x as u8, y as u8, 200]));
-        let read = image::load_from_memory(&png(&picture).unwrap())
-            .unwrap()
-            .into_rgb8();
-        assert_eq!(read, picture);
-    }
-
-    /// A directory of this test's own, removed when the test ends, also by a failure.
-    struct Scratch(std::path::PathBuf);
-
-    impl Scratch {
-        fn new(name: &str) -> Self {
-            let path = std::env::temp_dir().join(format!("compare-{name}-{}", process::id()));
-            fs::create_dir_all(&path).unwrap();
-            Self(path)
-        }
-
-        fn names(&self) -> Vec<String> {
-            let entries = fs::read_dir(&self.0).unwrap();
-            let mut names: Vec<_> = entries
-                .map(|e| e.unwrap().file_name().into_string().unwrap())
-                .collect();
-            names.sort();
-            names
-        }
-    }
-
-    impl Drop for Scratch {
-        fn drop(&mut self) {
-            let _ = fs::remove_dir_all(&self.0);
-        }
-    }
-
-    fn files(names: &[&str]) -> Vec<(String, Vec<u8>)> {
-        names
-            .iter()
-            .map(|&name| (name.to_string(), b"new".to_vec()))
-            .collect()
-    }
-
-    #[test]
-    fn write_replaces_its_own_files_and_no_others() {
-        let dir = Scratch::new("replace");
-        fs::write(dir.0.join("a"), "old").unwrap();
-        fs::write(dir.0.join("other"), "old").unwrap();
-        write(&dir.0, &files(&["a", "b"])).unwrap();
-        assert_eq!(dir.names(), ["a", "b", "other"]);
-        assert_eq!(fs::read(dir.0.join("a")).unwrap(), b"new");
-        assert_eq!(fs::read(dir.0.join("other")).unwrap(), b"old");
-
-        write(&dir.0.join("deep/er"), &files(&["a"])).unwrap();
-        assert_eq!(fs::read(dir.0.join("deep/er/a")).unwrap(), b"new");
-    }
-
-    #[test]
-    fn a_failed_write_leaves_nothing() {
-        let dir = Scratch::new("fail");
-        // The directory to write to is a file.
-        fs::write(dir.0.join("out"), "mine").unwrap();
-        let error = write(&dir.0.join("out"), &files(&["a"])).unwrap_err();
-        assert!(error.to_string().contains("out"), "{error}");
-        assert_eq!(dir.names(), ["out"]);
-        assert_eq!(fs::read(dir.0.join("out")).unwrap(), b"mine");
-
-        // One of the files cannot be replaced.
-        fs::create_dir(dir.0.join("b")).unwrap();
-        write(&dir.0, &files(&["a", "b"])).unwrap_err();
-        assert_eq!(dir.names(), ["b", "out"]);
-
-        // One of the files cannot be written, in a directory that was not there before.
-        write(&dir.0.join("new"), &files(&["a", "no/such"])).unwrap_err();
-        assert_eq!(dir.names(), ["b", "out"]);
     }
 }
