@@ -1,1 +1,4 @@
+mod method;
+mod rivals;
+
 fn main() {}
