@@ -22,7 +22,7 @@ use crate::method::ScreenMethod;
 /// As in the shader.
 const REACH: f64 = 16.6;
 const PX_PER_SAMPLE: f64 = 4.0;
-const GOLDEN_ANGLE: f64 = 2.39996322972865332;
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 
 /// The shape s of each channel, in 1/mm, whose edge is nearest to that of `profile`, and the worst
 /// error on that edge.

@@ -48,11 +48,11 @@ pub struct Responses {
 }
 
 impl Responses {
-    /// Of Gaussians with the profile's variances, on hard edges.
-    pub fn of_gaussians(terms: &[(f64, DVec3)]) -> Self {
-        Self::new(terms, 0.0, terms.len(), |x, across, i, j| {
-            let v = terms[i].0 * across.0 * across.0 + terms[j].0 * across.1 * across.1;
-            step(x, v)
+    /// Of Gaussians of these variances, on soft edges.
+    pub fn of_gaussians(terms: &[(f64, DVec3)], variances_mm2: &[f64]) -> Self {
+        let v = variances_mm2;
+        Self::new(terms, SOFT_MM2, v.len(), |x, (cos, sin), i, j| {
+            step(x, v[i] * cos * cos + v[j] * sin * sin + SOFT_MM2)
         })
     }
 
@@ -138,6 +138,9 @@ fn simplex(f: &impl Fn(&[f64]) -> f64, start: &[f64], spread: f64) -> (Vec<f64>,
     };
     for _ in 0..60 * n {
         points.sort_by(|a, b| a.1.total_cmp(&b.1));
+        if points[n].1 - points[0].1 < 1e-6 {
+            break;
+        }
         let center: Vec<f64> = (0..n)
             .map(|k| points[..n].iter().map(|p| p.0[k]).sum::<f64>() / n as f64)
             .collect();

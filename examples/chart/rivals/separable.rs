@@ -26,9 +26,9 @@ const WIDTHS_SATURATE: f64 = 1.0 / (300.0 * 5.671 * 0.012 * 0.012);
 #[derive(Clone, Debug)]
 pub struct Kernel {
     /// Distance of each pair from the center, which is the first, at 0.
-    offsets_mm: Vec<f64>,
+    pub offsets_mm: Vec<f64>,
     /// Weight of each pair, both taps together; they sum to 1.
-    weights: Vec<DVec3>,
+    pub weights: Vec<DVec3>,
     /// The demo's `sssWidth`, to which its taps scale.
     width_mm: f64,
     /// The worst error on the edges that it was fitted on.
@@ -105,23 +105,19 @@ fn published_weights(pairs: usize, range: f64, falloff: f64, strength: f64) -> V
     weights
 }
 
-/// The best single separable kernel of `pairs` pairs: a(x) = Σ cⱼ G₁(vⱼ, x) with the variances of
-/// the profile and the cⱼ of each colour that have the least worst error on edges at 0 to 45°; each
-/// tap has the integral of a over its cell.
+/// The best single separable kernel of `pairs` pairs: a(x) = Σ cⱼ G₁(vⱼ, x), see [`line_mixture`];
+/// each tap has the integral of a over its cell.
 pub fn fitted_kernel(profile: &Profile, pairs: usize) -> Kernel {
     let terms = terms(profile);
-    let mixture = line_mixture(profile);
-    let below = |x_mm: f64| -> DVec3 {
-        let part = |((v, _), c): (&(f64, DVec3), &DVec3)| *c * step(x_mm, *v);
-        terms.iter().zip(&mixture.0).map(part).sum()
-    };
+    let (mixture, _) = line_mixture(profile);
+    let below = |x_mm: f64| -> DVec3 { mixture.iter().map(|(v, c)| *c * step(x_mm, *v)).sum() };
     let fit = |width_mm: f64| {
         let offsets_mm = offsets(pairs, width_mm);
         let boundary = |k: usize| match k {
             k if k < pairs => below(0.5 * (offsets_mm[k] + offsets_mm[k + 1])),
             _ => DVec3::ONE,
         };
-        // Twice the half on this side: 2·boundary(0) − 1 for the center, whose cell has both sides.
+        // Twice what lies on this side: half of the center's cell, then the pairs'.
         let mut before = DVec3::splat(0.5);
         let weights: Vec<_> = (0..=pairs)
             .map(|k| 2.0 * (boundary(k) - std::mem::replace(&mut before, boundary(k))))
@@ -143,23 +139,29 @@ pub fn fitted_kernel(profile: &Profile, pairs: usize) -> Kernel {
     best_width(profile, fit)
 }
 
-/// The cⱼ of [`fitted_kernel`], and the worst error on hard edges that the kernel has before it is
-/// cut into taps.
-pub fn line_mixture(profile: &Profile) -> (Vec<DVec3>, DVec3) {
+/// The kernel along a line that, passed along rows and columns, has the least worst error on edges
+/// at 0 to 45°: a(x) = Σ cⱼ G₁(vⱼ, x) with cⱼ ≥ 0 over the variances of the profile, and over none,
+/// which is light that stays. Returns each vⱼ in mm² with the cⱼ of red, green and blue, and the
+/// worst error of each color on the edges that they were fitted on.
+pub fn line_mixture(profile: &Profile) -> (Vec<(f64, DVec3)>, DVec3) {
     let terms = terms(profile);
-    let responses = Responses::of_gaussians(&terms);
+    let start: Vec<_> = std::iter::once((0.0, DVec3::ZERO))
+        .chain(terms.iter().copied())
+        .collect();
+    let variances_mm2: Vec<_> = start.iter().map(|(v, _)| *v).collect();
+    let responses = Responses::of_gaussians(&terms, &variances_mm2);
     // Shares of squares are at least 0 and sum to 1.
     let shares = |p: &[f64]| -> Vec<f64> {
         let sum: f64 = p.iter().map(|p| p * p).sum();
         p.iter().map(|p| p * p / sum.max(1e-12)).collect()
     };
-    let mut mixture = vec![DVec3::ZERO; terms.len()];
+    let mut mixture = start.clone();
     let mut worst = DVec3::ZERO;
     for channel in 0..3 {
-        let start: Vec<_> = terms.iter().map(|(_, w)| w[channel].sqrt()).collect();
+        let start: Vec<_> = start.iter().map(|(_, w)| w[channel].sqrt()).collect();
         let (best, least) = minimise(|p| responses.worst(&shares(p), channel), &start, 0.2);
         worst[channel] = least;
-        for (to, from) in mixture.iter_mut().zip(shares(&best)) {
+        for ((_, to), from) in mixture.iter_mut().zip(shares(&best)) {
             to[channel] = from;
         }
     }
@@ -294,12 +296,5 @@ impl ScreenMethod for Separable {
 
     fn scratch_bytes_per_pixel(&self) -> f64 {
         PACKED_BYTES + 8.0
-    }
-}
-
-#[cfg(test)]
-impl Kernel {
-    pub fn sum(&self) -> DVec3 {
-        self.weights.iter().sum()
     }
 }

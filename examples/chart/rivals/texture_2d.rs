@@ -93,7 +93,11 @@ impl AtlasMethod for Texture2d {
             .zip(before)
             .map(|(pass, before)| bind(pass, &[source, before]))
             .collect();
-        let last = if self.sums.len() % 2 == 0 { even } else { odd };
+        let last = if self.sums.len().is_multiple_of(2) {
+            even
+        } else {
+            odd
+        };
         self.gutter.prepare(device, last, atlas);
         self.prepared = Some((bind(&self.source, &[atlas.irradiance]), sums));
         Ok(())
