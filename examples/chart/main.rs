@@ -1,12 +1,3 @@
-//! Error against time, for every method on every scene.
-#![cfg_attr(
-    not(test),
-    expect(
-        dead_code,
-        reason = "nothing is measured yet, so there is nothing to write"
-    )
-)]
-
 mod files;
 #[cfg(test)]
 mod fixture;
@@ -15,12 +6,13 @@ mod label;
 mod output;
 #[path = "../shared/page.rs"]
 mod page;
+mod method;
 mod panel;
 mod plot;
 mod report;
+mod rivals;
 mod row;
 mod scale;
 mod style;
 mod svg;
-
 fn main() {}

@@ -2,7 +2,7 @@
 //! and gives what a host gets back.
 
 use subsurface::wgpu::{CommandEncoder, Device};
-use subsurface::{Atlas, Error, ScreenFrame, ScreenSpace, TextureSpace};
+use subsurface::{Atlas, Error, Profile, ScreenFrame, ScreenSpace, TextureSpace};
 
 /// A method over a frame of a deferred renderer.
 pub trait ScreenMethod {
@@ -25,4 +25,52 @@ pub trait AtlasMethod {
     fn render(&self, encoder: &mut CommandEncoder);
     /// Textures of its own, in bytes a texel of the atlas.
     fn scratch_bytes_per_texel(&self) -> f64;
+}
+
+/// Full floats between passes; scratch as documented.
+impl ScreenMethod for ScreenSpace {
+    fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<(), Error> {
+        self.prepare(device, frame)
+    }
+
+    fn render(&self, encoder: &mut CommandEncoder) {
+        self.render(encoder);
+    }
+
+    /// What `shaders/gaussian_sum.wgsl` loads for skin where no row strays: positions, areas and
+    /// the metric of each pass included.
+    fn fetches(&self, px_per_mm: f64) -> Option<f64> {
+        // A point and its four neighbours.
+        const METRIC: f64 = 5.0;
+        // Depth and id; the area and E; the sum, the id and the alpha that is kept.
+        let mut fetches = 2.0 + (METRIC + 1.0) + 3.0;
+        for (i, g) in Profile::SKIN.gaussians().iter().enumerate() {
+            let reach = (3.5 * f64::from(g.variance_mm2).sqrt() * px_per_mm).ceil();
+            let row = 2.0 * reach + 1.0;
+            // Two loads a tap: its point, and its light or its row's sum.
+            let second = if reach <= 2.0 { row * row } else { row };
+            fetches += 2.0 * METRIC + 2.0 * row + 2.0 * second;
+            // The sum so far.
+            fetches += if i > 0 { 1.0 } else { 0.0 };
+        }
+        Some(fetches)
+    }
+
+    fn scratch_bytes_per_pixel(&self) -> f64 {
+        80.0
+    }
+}
+
+impl AtlasMethod for TextureSpace {
+    fn prepare(&mut self, device: &Device, atlas: &Atlas) -> Result<(), Error> {
+        self.prepare(device, atlas)
+    }
+
+    fn render(&self, encoder: &mut CommandEncoder) {
+        self.render(encoder);
+    }
+
+    fn scratch_bytes_per_texel(&self) -> f64 {
+        64.0
+    }
 }

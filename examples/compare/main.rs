@@ -5,6 +5,7 @@
 //! cargo run --release --example compare
 //! ```
 
+#[path = "../shared/metrics.rs"]
 mod metrics;
 #[path = "../shared/output.rs"]
 mod output;
@@ -23,7 +24,7 @@ use subsurface::renderer::{
     AtlasRenderer, AtlasTimes, Camera, GBuffer, Gpu, Layer as Shown, Lighting, Renderer, Scene,
     Specular, View,
 };
-use subsurface::{Error, Profile, ScreenFrame, ScreenSpace, wgpu};
+use subsurface::{Error, Profile, ScreenFrame, ScreenSpace, TextureSpace, wgpu};
 
 use metrics::Layer;
 use report::{DIFFERENCE_GAIN, ModeReport, Report};
@@ -339,10 +340,11 @@ fn scatter_screen(
 fn scatter_texture(
     gpu: &Gpu,
     renderer: &Renderer,
-    mut atlas: AtlasRenderer,
+    atlas: AtlasRenderer,
     options: &Options,
 ) -> Result<Scattered, Error> {
     let output = renderer.scattered_target(gpu);
+    let mut effect = TextureSpace::new(&gpu.device, output.texture().format())?;
     let (mut raster, mut blur, mut both) = (Vec::new(), Vec::new(), Vec::new());
     let timed = Instant::now();
     while more_runs(both.len(), timed) {
@@ -352,6 +354,11 @@ fn scatter_texture(
             &[options.profile],
             options.mm_per_unit,
             &output,
+            |atlas| {
+                effect.prepare(&gpu.device, atlas)?;
+                gpu.run(|encoder| effect.render(encoder));
+                Ok(())
+            },
         )?;
         raster.push(times.raster_ms);
         blur.push(times.blur_ms);

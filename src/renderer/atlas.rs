@@ -1,5 +1,5 @@
-//! The host's side of texture space: draws each UV page of each mesh into an atlas, has it
-//! scattered, and draws the result back onto the screen. Driver of `shaders/renderer/atlas.wgsl`
+//! The host's side of texture space: draws each UV page of each mesh into an atlas, lets an effect
+//! scatter it, and draws the result back onto the screen. Driver of `shaders/renderer/atlas.wgsl`
 //! and `resample.wgsl`.
 
 use std::time::Instant;
@@ -7,14 +7,13 @@ use std::time::Instant;
 use wgpu::TextureFormat;
 
 use super::{Gpu, IRRADIANCE, Pipeline, Renderer, mesh::Mesh};
-use crate::{Atlas, Error, Profile, TextureSpace};
+use crate::{Atlas, Error, Profile};
 
 /// The atlas of one page, used for one after the other.
 pub struct AtlasRenderer {
     irradiance: wgpu::TextureView,
     positions: wgpu::TextureView,
     scattered: wgpu::TextureView,
-    effect: TextureSpace,
     light: wgpu::RenderPipeline,
     resample: wgpu::RenderPipeline,
     resample_group: wgpu::BindGroup,
@@ -155,25 +154,26 @@ impl AtlasRenderer {
                 TextureFormat::Rgba32Float,
             ),
             scattered,
-            effect: TextureSpace::new(device, IRRADIANCE)?,
             light,
             resample,
             resample_group,
         })
     }
 
-    /// Scatters the scene as `renderer` last lit it and draws the result into `output`, which
-    /// elsewhere takes the irradiance as it was.
+    /// Has the scene scattered as `renderer` last lit it and draws the result into `output`, which
+    /// elsewhere takes the irradiance as it was. `scatter` fills the output of the atlas that it is
+    /// handed, of `output`'s format, and waits for it.
     ///
     /// # Errors
-    /// A primitive that scatters and has no UVs.
+    /// A primitive that scatters and has no UVs; those of `scatter`.
     pub fn render(
-        &mut self,
+        &self,
         gpu: &Gpu,
         renderer: &Renderer,
         profiles: &[Profile],
         mm_per_unit: f32,
         output: &wgpu::TextureView,
+        mut scatter: impl FnMut(&Atlas) -> Result<(), Error>,
     ) -> Result<AtlasTimes, Error> {
         let scatters = 1..=profiles.len();
         let skin = || {
@@ -202,17 +202,13 @@ impl AtlasRenderer {
                 times.raster_ms += start.elapsed().as_secs_f64() * 1e3;
 
                 let start = Instant::now();
-                self.effect.prepare(
-                    &gpu.device,
-                    &Atlas {
-                        irradiance: &self.irradiance,
-                        positions: &self.positions,
-                        output: &self.scattered,
-                        mm_per_unit,
-                        profiles,
-                    },
-                )?;
-                gpu.run(|encoder| self.effect.render(encoder));
+                scatter(&Atlas {
+                    irradiance: &self.irradiance,
+                    positions: &self.positions,
+                    output: &self.scattered,
+                    mm_per_unit,
+                    profiles,
+                })?;
                 times.blur_ms += start.elapsed().as_secs_f64() * 1e3;
 
                 gpu.run(|encoder| self.draw_screen(encoder, renderer, mesh, page.clone(), output));

@@ -1,0 +1,252 @@
+//! A full-screen pass, and the textures that passes hand to each other.
+
+use subsurface::wgpu::{
+    self, BindGroup, BindGroupLayout, BindingResource, BindingType, BlendState, Color, ColorWrites,
+    CommandEncoder, Device, LoadOp, RenderPipeline, SamplerBindingType, TextureFormat,
+    TextureSampleType, TextureView,
+};
+
+/// What a binding is; a pass numbers its bindings from 0 in their order.
+#[derive(Clone, Copy)]
+pub enum Slot {
+    Uniform,
+    /// Loaded, of any float or depth format.
+    Float,
+    /// Sampled with filtering.
+    Filtered,
+    Uint,
+    Sampler,
+}
+
+/// Where a pass writes.
+#[derive(Clone, Copy)]
+pub struct Target {
+    pub format: TextureFormat,
+    pub blend: Option<BlendState>,
+    pub writes: ColorWrites,
+}
+
+impl From<TextureFormat> for Target {
+    fn from(format: TextureFormat) -> Self {
+        Self {
+            format,
+            blend: None,
+            writes: ColorWrites::ALL,
+        }
+    }
+}
+
+/// Draws one triangle over its targets by the fragment shader `entry_point` of a WGSL text that
+/// has a `vs_main`, too.
+pub struct Pass {
+    label: String,
+    layout: BindGroupLayout,
+    pipeline: RenderPipeline,
+}
+
+impl Pass {
+    /// `constants` are the values of the text's `override`s.
+    pub fn new(
+        device: &Device,
+        label: &str,
+        (wgsl, entry_point): (&str, &str),
+        slots: &[Slot],
+        targets: &[Target],
+        constants: &[(&str, f64)],
+    ) -> Self {
+        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(wgsl.into()),
+        });
+        let entries: Vec<_> = slots
+            .iter()
+            .zip(0..)
+            .map(|(slot, binding)| wgpu::BindGroupLayoutEntry {
+                binding,
+                visibility: wgpu::ShaderStages::FRAGMENT,
+                ty: slot.binding_type(),
+                count: None,
+            })
+            .collect();
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(label),
+            entries: &entries,
+        });
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(label),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let targets: Vec<_> = targets
+            .iter()
+            .map(|target| {
+                Some(wgpu::ColorTargetState {
+                    format: target.format,
+                    blend: target.blend,
+                    write_mask: target.writes,
+                })
+            })
+            .collect();
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some(label),
+            layout: Some(&pipeline_layout),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("vs_main"),
+                compilation_options: Default::default(),
+                buffers: &[],
+            },
+            primitive: Default::default(),
+            depth_stencil: None,
+            multisample: Default::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some(entry_point),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants,
+                    ..Default::default()
+                },
+                targets: &targets,
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        Self {
+            label: label.into(),
+            layout,
+            pipeline,
+        }
+    }
+
+    /// Binds the resources, in the order of the slots.
+    pub fn bind(&self, device: &Device, resources: &[BindingResource]) -> BindGroup {
+        let entries: Vec<_> = resources
+            .iter()
+            .zip(0..)
+            .map(|(resource, binding)| wgpu::BindGroupEntry {
+                binding,
+                resource: resource.clone(),
+            })
+            .collect();
+        device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(&self.label),
+            layout: &self.layout,
+            entries: &entries,
+        })
+    }
+
+    /// Draws over all of targets that need not hold anything yet.
+    pub fn draw(&self, encoder: &mut CommandEncoder, group: &BindGroup, targets: &[&TextureView]) {
+        let targets: Vec<_> = targets.iter().map(|&view| (view, CLEAR)).collect();
+        self.draw_onto(encoder, group, &targets, Color::BLACK);
+    }
+
+    /// Draws over targets, each cleared or kept, with the constant that blending uses.
+    pub fn draw_onto(
+        &self,
+        encoder: &mut CommandEncoder,
+        group: &BindGroup,
+        targets: &[(&TextureView, LoadOp<Color>)],
+        blend_constant: Color,
+    ) {
+        let attachments: Vec<_> = targets
+            .iter()
+            .map(|&(view, load)| {
+                Some(wgpu::RenderPassColorAttachment {
+                    view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load,
+                        store: wgpu::StoreOp::Store,
+                    },
+                })
+            })
+            .collect();
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some(&self.label),
+            color_attachments: &attachments,
+            ..Default::default()
+        });
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, group, &[]);
+        pass.set_blend_constant(blend_constant);
+        pass.draw(0..3, 0..1);
+    }
+}
+
+/// The vertex shader of every pass.
+pub const TRIANGLE: &str = include_str!("triangle.wgsl");
+
+/// For targets of which every pixel is written, or that start from nothing.
+pub const CLEAR: LoadOp<Color> = LoadOp::Clear(Color::TRANSPARENT);
+
+impl Slot {
+    fn binding_type(self) -> BindingType {
+        let texture = |sample_type| BindingType::Texture {
+            sample_type,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled: false,
+        };
+        match self {
+            Self::Uniform => BindingType::Buffer {
+                ty: wgpu::BufferBindingType::Uniform,
+                has_dynamic_offset: false,
+                min_binding_size: None,
+            },
+            Self::Float => texture(TextureSampleType::Float { filterable: false }),
+            Self::Filtered => texture(TextureSampleType::Float { filterable: true }),
+            Self::Uint => texture(TextureSampleType::Uint),
+            Self::Sampler => BindingType::Sampler(SamplerBindingType::Filtering),
+        }
+    }
+}
+
+/// Bilinear, clamped to the edge.
+pub fn linear_sampler(device: &Device) -> wgpu::Sampler {
+    device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some("rivals linear"),
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        ..Default::default()
+    })
+}
+
+/// Width and height in pixels.
+pub fn size(view: &TextureView) -> [u32; 2] {
+    [view.texture().width(), view.texture().height()]
+}
+
+/// Textures of these formats and this size: those at hand where they fit, new ones otherwise.
+pub fn scratch<const N: usize>(
+    device: &Device,
+    label: &str,
+    at_hand: Option<[TextureView; N]>,
+    size: [u32; 2],
+    formats: [TextureFormat; N],
+) -> [TextureView; N] {
+    if let Some(views) = at_hand.filter(|views| views.iter().all(|v| self::size(v) == size)) {
+        return views;
+    }
+    formats.map(|format| texture(device, label, size, format))
+}
+
+/// A texture that passes write and read.
+pub fn texture(device: &Device, label: &str, size: [u32; 2], format: TextureFormat) -> TextureView {
+    device
+        .create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width: size[0],
+                height: size[1],
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        })
+        .create_view(&Default::default())
+}
