@@ -37,7 +37,7 @@ impl ScreenMethod for ScreenSpace {
         self.render(encoder);
     }
 
-    /// What `shaders/gaussian_sum.wgsl` loads for skin where no row strays: positions, areas and
+    /// What the shaders load by `Profile::SKIN` where no row strays: positions, areas and
     /// the metric of each pass included.
     fn fetches(&self, px_per_mm: f64) -> Option<f64> {
         // A point and its four neighbours.

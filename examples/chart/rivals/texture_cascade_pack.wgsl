@@ -1,4 +1,6 @@
-// Readies an atlas for the cascade: the light with its mask, and the stretch map of [EL07].
+// Readies an atlas for the cascade: the light with its mask, and the stretch map.
+// [EL07] d'Eon & Luebke 2007, "Advanced techniques for realistic real-time skin rendering", GPU
+// Gems 3, ch. 14.
 
 @group(0) @binding(2) var irradiance: texture_2d<f32>;
 
