@@ -1,6 +1,6 @@
 //! The charts, as drawings.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use subsurface::Profile;
 
 use crate::label::Area;
@@ -11,7 +11,7 @@ use crate::style::{COPY, NONE, Style, distinct, styles};
 use crate::svg::{Svg, Type, text_width};
 
 /// Frames a second against the number of heads.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct Series {
     /// A method and its setting, as in `screen_planned 1/255`, or any other text.
     pub name: String,

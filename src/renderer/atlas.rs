@@ -7,7 +7,7 @@ use std::time::Instant;
 use wgpu::TextureFormat;
 
 use super::{Gpu, IRRADIANCE, Pipeline, Renderer, mesh::Mesh};
-use crate::{Atlas, Error, Profile};
+use crate::{Atlas, Error, Profile, TextureSpace};
 
 /// The atlas of one page, used for one after the other.
 pub struct AtlasRenderer {
