@@ -5,7 +5,7 @@ mod common;
 use common::gpu;
 use subsurface::renderer::{AtlasRenderer, Camera, Layer, Lighting, Renderer, Scene, View};
 use subsurface::wgpu::TextureView;
-use subsurface::{Profile, ScreenFrame, ScreenSpace};
+use subsurface::{Atlas, Error, Profile, ScreenFrame, ScreenSpace, TextureSpace};
 
 const HEAD: &[u8] = include_bytes!("../examples/compare/head.glb");
 const SIZE: [u32; 2] = [256, 256];
@@ -42,16 +42,27 @@ fn screen_space(head: &Head) -> TextureView {
     output
 }
 
+/// Texture space, into `output`.
+fn scatter_texture(head: &Head, size: u32, output: &TextureView) -> Result<(), Error> {
+    let mut effect = TextureSpace::new(&gpu().device, output.texture().format())?;
+    let atlas = AtlasRenderer::new(gpu(), &head.renderer, size)?;
+    let profiles = [Profile::SKIN];
+    let scatter = |atlas: &Atlas| {
+        effect.prepare(&gpu().device, atlas)?;
+        gpu().run(|encoder| effect.render(encoder));
+        Ok(())
+    };
+    atlas.render(gpu(), &head.renderer, &profiles, 1000.0, output, scatter)?;
+    Ok(())
+}
+
 #[test]
 fn both_modes_agree_better_than_with_no_scattering() {
     let scene = Scene::from_glb(HEAD).unwrap();
     let head = render(&scene);
     let screen = gpu().read(&screen_space(&head));
     let output = head.renderer.scattered_target(gpu());
-    AtlasRenderer::new(gpu(), &head.renderer, 1024)
-        .unwrap()
-        .render(gpu(), &head.renderer, &[Profile::SKIN], 1000.0, &output)
-        .unwrap();
+    scatter_texture(&head, 1024, &output).unwrap();
     let texture = gpu().read(&output);
     let none = gpu().read(&head.renderer.gbuffer.irradiance);
     let skin = gpu().read_bytes(head.renderer.gbuffer.profile_id.texture());
@@ -98,9 +109,7 @@ fn a_mesh_without_uvs_scatters_in_screen_space_only() {
     }
     let head = render(&scene);
     let output = head.renderer.scattered_target(gpu());
-    let error = AtlasRenderer::new(gpu(), &head.renderer, 256)
-        .unwrap()
-        .render(gpu(), &head.renderer, &[Profile::SKIN], 1000.0, &output)
+    let error = scatter_texture(&head, 256, &output)
         .unwrap_err()
         .to_string();
     assert!(

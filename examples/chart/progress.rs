@@ -129,3 +129,41 @@ impl Progress {
         let _ = std::fs::remove_dir_all(&self.directory);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_finished_scene_is_found_again_by_the_same_command_alone() {
+        let cache = std::env::temp_dir().join(format!("progress-{}", std::process::id()));
+        let picture = RgbImage::from_fn(3, 2, |x, y| image::Rgb([x as u8, y as u8, 9]));
+        let mut done = Done {
+            notes: vec!["a note".into()],
+            ..Default::default()
+        };
+        let images = SceneImages {
+            scene: "front".into(),
+            truth: picture.clone(),
+            entries: vec![("none".into(), picture.clone(), picture.clone())],
+        };
+        done.keep_images(&images).unwrap();
+
+        let progress = Progress::new(&cache, "adapter", "chart").unwrap();
+        assert!(progress.read("front").is_none());
+        progress.keep("front", &done).unwrap();
+        let found = Progress::new(&cache, "adapter", "chart")
+            .unwrap()
+            .read("front")
+            .unwrap();
+        assert_eq!(found.notes, done.notes);
+        let found = found.images().unwrap().unwrap();
+        assert_eq!(found.truth, picture);
+        assert_eq!(found.entries, images.entries);
+        let other = Progress::new(&cache, "adapter", "chart --quick").unwrap();
+        assert!(other.read("front").is_none());
+        progress.forget();
+        assert!(progress.read("front").is_none());
+        std::fs::remove_dir_all(&cache).unwrap();
+    }
+}

@@ -7,9 +7,9 @@ use serde_json::Value;
 
 use crate::files::Chart;
 use crate::page::{address, escape, head, line};
+use crate::plot::scale::rounded;
+use crate::plot::style::{distinct, styles};
 use crate::row::Row;
-use crate::scale::rounded;
-use crate::style::{distinct, styles};
 
 /// The pictures of a scene.
 pub struct SceneImages {

@@ -13,7 +13,8 @@ use subsurface::{Error, Profile};
 const RED_SIGMA_MM: f64 = 1.176;
 /// Projected widths of the edges: red σ in pixels.
 const EDGES_PX: [f64; 8] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
-/// From this width on, the truth is asked for at every fourth pixel each way: it would take hours.
+/// From this width on, the truth of an edge is asked for at so many times fewer pixels each way: it
+/// would take hours.
 const SPARSE_FROM_PX: f64 = 8.0;
 const SPARSE: u32 = 4;
 
@@ -66,14 +67,17 @@ pub struct Head {
 }
 
 impl Scene {
+    /// The scene of this name; the truth is asked for at every `stride` pixels, or fewer.
+    ///
     /// # Errors
-    /// A size that the device cannot render.
+    /// A name that is none, or a size that the device cannot render.
     pub fn new(
         gpu: &Gpu,
         model: &Model,
         mm_per_unit: f32,
         name: &str,
         size: [u32; 2],
+        stride: u32,
     ) -> Result<Self, Error> {
         let view = |view| Camera::framing(model, view, size);
         let camera = match name {
@@ -82,22 +86,25 @@ impl Scene {
             "close-up" => view(View::CloseUp),
             "profile" => view(View::Profile),
             "far" => far(view(View::Front), size, mm_per_unit),
-            "sphere" => return Ok(sphere(gpu, size)),
+            "sphere" => return Ok(sphere(gpu, size, stride)),
             _ => {
                 let width = name.strip_prefix("edge_").and_then(|px| px.parse().ok());
                 return match width {
-                    Some(sigma_px) if EDGES_PX.contains(&sigma_px) => Ok(edge(gpu, size, sigma_px)),
+                    Some(sigma_px) if EDGES_PX.contains(&sigma_px) => {
+                        Ok(edge(gpu, size, sigma_px, stride))
+                    }
                     _ => Err(Error::new("--scenes", name, names().join(", "))),
                 };
             }
         };
-        Self::head(gpu, model, mm_per_unit, name, size, camera)
+        let scene = Self::head(gpu, model, mm_per_unit, name, size, camera)?;
+        Ok(Self { stride, ..scene })
     }
 
     /// Any view of heads.
     ///
     /// # Errors
-    /// As [`Scene::new`].
+    /// A size that the device cannot render.
     pub fn head(
         gpu: &Gpu,
         model: &Model,
@@ -191,12 +198,12 @@ struct Hit {
 }
 
 /// A ball of 10 mm, lit from the side, across half of the picture's height.
-fn sphere(gpu: &Gpu, size: [u32; 2]) -> Scene {
+fn sphere(gpu: &Gpu, size: [u32; 2], stride: u32) -> Scene {
     const RHO_MM: f64 = 10.0;
     let px_per_mm = 0.25 * f64::from(size[1]) / RHO_MM;
     let light = DVec3::new(1.0, 0.0, 1.0).normalize();
     let scattered = closed_form::scattered_cosine(RHO_MM, &Profile::SKIN);
-    orthographic(gpu, "sphere".into(), size, px_per_mm, 1, |at| {
+    orthographic(gpu, "sphere".into(), size, px_per_mm, stride, |at| {
         let z2 = RHO_MM * RHO_MM - at.length_squared();
         (z2 > 0.0).then(|| {
             let point_mm = at.extend(z2.sqrt());
@@ -213,11 +220,12 @@ fn sphere(gpu: &Gpu, size: [u32; 2]) -> Scene {
 }
 
 /// A straight edge, soft by σ = 1 px, at 30°, over a whole frame of skin.
-fn edge(gpu: &Gpu, size: [u32; 2], sigma_px: f64) -> Scene {
+fn edge(gpu: &Gpu, size: [u32; 2], sigma_px: f64, stride: u32) -> Scene {
     let px_per_mm = sigma_px / RED_SIGMA_MM;
     let blur_mm2 = px_per_mm.powi(-2);
     let across = DVec2::from_angle(30f64.to_radians());
-    let stride = if sigma_px < SPARSE_FROM_PX { 1 } else { SPARSE };
+    let sparse = if sigma_px < SPARSE_FROM_PX { 1 } else { SPARSE };
+    let stride = stride * sparse;
     let name = format!("edge_{sigma_px}");
     orthographic(gpu, name, size, px_per_mm, stride, |at| {
         let x = at.dot(across);

@@ -24,7 +24,7 @@ pub struct Truths {
 }
 
 /// What the truths are made by; as they change, so does the name.
-const SOURCES: [&str; 10] = [
+const SOURCES: [&str; 9] = [
     include_str!("../../src/truth/cloud.rs"),
     include_str!("../../src/truth/closed_form.rs"),
     include_str!("../../src/truth/surface.rs"),
@@ -34,7 +34,6 @@ const SOURCES: [&str; 10] = [
     include_str!("../../shaders/renderer/lighting.wgsl"),
     include_str!("../../shaders/renderer/material.wgsl"),
     include_str!("../../shaders/renderer/probe.wgsl"),
-    include_str!("scene.rs"),
 ];
 
 impl Truths {
@@ -224,4 +223,75 @@ fn key(model: &Model, scene: &Scene, profile: &Profile) -> u64 {
     scene.skin.hash(&mut hasher);
     scene.stride.hash(&mut hasher);
     hasher.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn half_the_samples_change_nothing() {
+        let gpu = Gpu::headless().unwrap();
+        let model = Model::from_glb(crate::HEAD).unwrap();
+        for view in ["front", "close-up"] {
+            let scene = Scene::new(&gpu, &model, 1000.0, view, [64, 64], 1).unwrap();
+            let Surface::Head(head) = &scene.surface else {
+                panic!("a view of the head has a head");
+            };
+            let asked: Vec<Patch> = scene.pixels.iter().map(|p| p.patch).collect();
+            let of = |density| {
+                let none = |_| ();
+                eq7(
+                    &gpu,
+                    &model,
+                    head,
+                    1000.0,
+                    &asked,
+                    &Profile::SKIN,
+                    density,
+                    &none,
+                )
+            };
+            let (whole, half) = (of(1.0), of(0.5));
+            let worst = |a: &[Vec3], b: &[Vec3]| {
+                let pairs = a.iter().zip(b);
+                let worst = pairs.map(|(a, b)| (a - b).abs().max_element());
+                worst.fold(0.0, f32::max)
+            };
+            let printed = worst(&whole.printed, &half.printed);
+            let normalised = worst(&whole.normalised, &half.normalised);
+            println!(
+                "{view}: {} and {} samples, at most {printed:.5} as printed, {normalised:.5} normalised",
+                whole.samples, half.samples,
+            );
+            assert!(
+                printed <= 0.001 && normalised <= 0.001,
+                "{view}: {printed}, {normalised}"
+            );
+        }
+    }
+
+    #[test]
+    fn truths_are_kept_and_found_again() {
+        let gpu = Gpu::headless().unwrap();
+        let model = Model::from_glb(crate::HEAD).unwrap();
+        let cache = std::env::temp_dir().join(format!("truths-{}", std::process::id()));
+        let scene = |name| Scene::new(&gpu, &model, 1000.0, name, [32, 32], 1).unwrap();
+        let bar = ProgressBar::hidden();
+        let truths =
+            |scene: &Scene| Truths::of(&gpu, &model, scene, &Profile::SKIN, &cache, &bar).unwrap();
+        let count = || std::fs::read_dir(&cache).unwrap().count();
+        let first = truths(&scene("sphere"));
+        assert_eq!(count(), 1);
+        assert_eq!(truths(&scene("sphere")), first);
+        assert_eq!(count(), 1);
+        // Another scene has another name; a file cut short is not believed.
+        assert_ne!(truths(&scene("edge_8")), first);
+        assert_eq!(count(), 2);
+        for entry in std::fs::read_dir(&cache).unwrap() {
+            std::fs::write(entry.unwrap().path(), "cut").unwrap();
+        }
+        assert_eq!(truths(&scene("sphere")), first);
+        std::fs::remove_dir_all(&cache).unwrap();
+    }
 }

@@ -1,6 +1,6 @@
 //! How a method looks in every picture: its name for people, its colour and its shape.
 
-use crate::svg::Marker;
+use crate::plot::svg::Marker;
 
 /// Does nothing: the light as it fell.
 pub const NONE: &str = "none";

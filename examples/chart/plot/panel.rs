@@ -1,10 +1,10 @@
 //! A pair of axes, and what is drawn between them.
 
-use crate::label::{Area, beside, spread};
+use crate::plot::label::{Area, beside, spread};
+use crate::plot::scale::{Scale, Tick, rounded};
+use crate::plot::style::{COPY, NONE, Style};
+use crate::plot::svg::{Point, Stroke, Svg, Type, text_width};
 use crate::row::Row;
-use crate::scale::{Scale, Tick, rounded};
-use crate::style::{COPY, NONE, Style};
-use crate::svg::{Point, Stroke, Svg, Type, text_width};
 
 pub const INK: &str = "#222";
 pub const DIM: &str = "#4a4a4a";
