@@ -76,7 +76,7 @@ Usage: cargo run --release --example chart -- [OPTIONS]
                     and heads, separated by commas                      [all]
   --methods LIST    such as screen_exact,burley_disk                    [all]
   --size WxH        of the frames, in pixels                            [512x512; quick: 256x256]
-  --quick           fewer runs, smaller atlases, truths at every second pixel
+  --quick           fewer runs, smaller atlases, truths at every fourth pixel, not every second
   --model FILE      a .glb or .gltf file                                [the built-in head]
   --mm-per-unit X   length of the model's unit in mm                    [1000: metres]
   --cache DIR       where truths and finished scenes are kept           [out/chart-cache]
@@ -195,7 +195,7 @@ impl Plan {
                     all: 3,
                     compared: 5,
                 },
-                stride: 2,
+                stride: 4,
                 atlases: &[256, 512],
                 atlas_2d: 256,
                 atlas_runs: 1,
@@ -208,7 +208,7 @@ impl Plan {
                 all: 9,
                 compared: 31,
             },
-            stride: 1,
+            stride: 2,
             atlases: &[512, 1024],
             atlas_2d: 512,
             atlas_runs: 9,

@@ -16,7 +16,7 @@ const EDGES_PX: [f64; 8] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
 /// From this width on, the truth of an edge is asked for at so many times fewer pixels each way: it
 /// would take hours.
 const SPARSE_FROM_PX: f64 = 8.0;
-const SPARSE: u32 = 4;
+const SPARSE: u32 = 2;
 
 /// Names of the scenes, in the order in which they are run.
 pub fn names() -> Vec<String> {

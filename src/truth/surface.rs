@@ -41,7 +41,7 @@ pub struct SurfaceIntegral {
 
 /// Side of a sample's area over σ, at a density of 1, and at most so many mm, which is what light
 /// itself asks for: pores, and the edges of shadows.
-const SPACING_SIGMAS: f32 = 0.7;
+const SPACING_SIGMAS: f32 = 0.5;
 const SPACING_MM: f32 = 0.2;
 
 /// Places that light is asked for at once.
@@ -50,7 +50,7 @@ const BATCH: usize = 1 << 20;
 /// Eq. 7, L_d(p) = ∫ E(q) R(|q − p|) dA over the whole mesh, at the points `asked` for; of these only
 /// the place counts, and for Gaussians of no width their irradiance.
 ///
-/// The mesh is cut into patches about σ wide for narrow Gaussians, near the points alone, and .2 mm
+/// The mesh is cut into pieces half a σ wide for narrow Gaussians, near the points alone, and .2 mm
 /// for others, `density` times as many. `light` gives the irradiance at each place that it is handed.
 ///
 /// # Errors
@@ -83,16 +83,18 @@ pub fn surface_integral<E>(
     for (spacing_mm, gaussians) in &groups {
         let widest = gaussians.iter().map(|g| g.variance_mm2).fold(0.0, f32::max);
         let reach_mm = REACH_SIGMAS * widest.sqrt();
-        let (places, mut patches) = cut(mesh, &points, reach_mm, *spacing_mm);
+        let pieces = cut(mesh, &points, reach_mm, *spacing_mm);
         let share = 0.5 / groups.len() as f64;
-        let total = places.len();
-        for (places, patches) in places.chunks(BATCH).zip(patches.chunks_mut(BATCH)) {
-            for (patch, e) in patches.iter_mut().zip(light(places)?) {
-                patch.irradiance = e;
+        let mut patches = Vec::with_capacity(3 * pieces.len());
+        for batch in pieces.chunks(BATCH) {
+            let places: Vec<Place> = batch.iter().map(|p| p.place).collect();
+            for (piece, irradiance) in batch.iter().zip(light(&places)?) {
+                patches.extend(piece.thirds(irradiance));
             }
-            progress(share * patches.len() as f64 / total as f64);
+            progress(share * batch.len() as f64 / pieces.len() as f64);
         }
-        result.samples += total;
+        result.samples += pieces.len();
+        drop(pieces);
         let cloud = Cloud::new(&patches);
         let sums = |p: &Patch| {
             let mut sums = [Vec3::ZERO; 2];
@@ -142,13 +144,28 @@ impl Points {
     }
 }
 
-/// Cuts what lies within `reach_mm` of the points into patches, still unlit.
-fn cut(
-    mesh: Triangles,
-    points: &Points,
-    reach_mm: f32,
-    spacing_mm: f32,
-) -> (Vec<Place>, Vec<Patch>) {
+/// A small triangle, lit at its middle.
+struct Piece {
+    place: Place,
+    corners_mm: [Vec3; 3],
+}
+
+impl Piece {
+    /// Three points that stand for the triangle: a sum over them is right for all that is quadratic
+    /// across it, so that its mass does not depend on how a mesh is cut.
+    fn thirds(&self, irradiance: Vec3) -> [Patch; 3] {
+        let [a, b, c] = self.corners_mm;
+        let area_mm2 = (b - a).cross(c - a).length() / 6.0;
+        self.corners_mm.map(|corner| Patch {
+            point_mm: (a + b + c + 3.0 * corner) / 6.0,
+            area_mm2,
+            irradiance,
+        })
+    }
+}
+
+/// Cuts what lies within `reach_mm` of the points into pieces.
+fn cut(mesh: Triangles, points: &Points, reach_mm: f32, spacing_mm: f32) -> Vec<Piece> {
     let cutter = Cutter {
         points,
         reach_mm,
@@ -162,11 +179,11 @@ fn cut(
                 point_mm: mesh.vertices_mm[corners[i] as usize],
                 barycentric: Vec3::AXES[i],
             };
-            let mut patches = Vec::new();
-            cutter.cut(triangle, [0, 1, 2].map(corner), false, &mut patches);
-            patches
+            let mut pieces = Vec::new();
+            cutter.cut(triangle, [0, 1, 2].map(corner), false, &mut pieces);
+            pieces
         })
-        .unzip()
+        .collect()
 }
 
 struct Cutter<'a> {
@@ -189,7 +206,7 @@ impl Cutter<'_> {
         triangle: usize,
         corners: [Corner; 3],
         mut is_near: bool,
-        patches: &mut Vec<(Place, Patch)>,
+        pieces: &mut Vec<Piece>,
     ) {
         let [a, b, c] = corners.map(|c| c.point_mm);
         let center = (a + b + c) / 3.0;
@@ -208,16 +225,14 @@ impl Cutter<'_> {
             .unwrap_or(0);
         // What is not finite would never become small.
         if edges[longest] <= self.longest_mm || !edges[longest].is_finite() {
-            let place = Place {
-                triangle,
-                barycentric: corners.iter().map(|c| c.barycentric).sum::<Vec3>() / 3.0,
-            };
-            let patch = Patch {
-                point_mm: center,
-                area_mm2: 0.5 * (b - a).cross(c - a).length(),
-                irradiance: Vec3::ZERO,
-            };
-            patches.push((place, patch));
+            let barycentric = corners.iter().map(|c| c.barycentric).sum::<Vec3>() / 3.0;
+            pieces.push(Piece {
+                place: Place {
+                    triangle,
+                    barycentric,
+                },
+                corners_mm: [a, b, c],
+            });
             return;
         }
         let [start, end] = [longest, (longest + 1) % 3];
@@ -228,7 +243,7 @@ impl Cutter<'_> {
         for replaced in [start, end] {
             let mut half = corners;
             half[replaced] = middle;
-            self.cut(triangle, half, is_near, patches);
+            self.cut(triangle, half, is_near, pieces);
         }
     }
 }
