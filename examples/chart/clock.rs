@@ -11,8 +11,10 @@ use crate::method::ScreenMethod;
 #[derive(Clone, Copy)]
 pub struct Rounds {
     pub all: usize,
-    /// Of the methods that are compared by their ratio.
+    /// Of the methods that are compared by their ratio, as long as those after `all` take no longer
+    /// than `seconds`.
     pub compared: usize,
+    pub seconds: f64,
 }
 
 /// Milliseconds of each method, one a round; prepared before, and warmed up. `compared` tells which
@@ -24,7 +26,14 @@ pub fn rounds(
     mut tick: impl FnMut(),
 ) -> Vec<Vec<f64>> {
     let mut times = vec![Vec::new(); methods.len()];
+    let mut since = Instant::now();
     for round in 0..rounds.compared.max(rounds.all) {
+        if round == rounds.all {
+            since = Instant::now();
+        }
+        if round > rounds.all && since.elapsed().as_secs_f64() > rounds.seconds {
+            break;
+        }
         for i in 0..methods.len() {
             let i = if round % 2 == 0 {
                 i

@@ -2,19 +2,17 @@
 
 use std::time::Instant;
 
-use subsurface::renderer::{AtlasRenderer, AtlasTimes, Camera, Gpu, Scene as Model, View};
-use subsurface::{Error, Profile, ScreenFrame};
+use subsurface::renderer::{AtlasRenderer, Camera, Gpu, Renderer, Scene as Model, View};
+use subsurface::wgpu::TextureView;
+use subsurface::{Error, Profile};
 
 use crate::method::{AtlasMethod, ScreenMethod};
+use crate::options::Plan;
 use crate::plot::Series;
 use crate::scene::{Scene, Surface};
 
 /// Numbers of heads, and the columns in which they stand.
-const HEADS: [(usize, usize); 5] = [(1, 1), (2, 2), (4, 2), (8, 4), (16, 4)];
-
-/// A series runs as often as fits into this time, and once at least.
-const SECONDS: f64 = 10.0;
-const RUNS: usize = 9;
+pub const HEADS: [(usize, usize); 5] = [(1, 1), (2, 2), (4, 2), (8, 4), (16, 4)];
 
 /// What the figure compares: a method over an atlas of a size, how many heads it is timed at.
 pub struct Textured<'a> {
@@ -34,42 +32,31 @@ pub fn figure(
     gpu: &Gpu,
     model: &Model,
     mm_per_unit: f32,
-    size: [u32; 2],
-    screen: &mut dyn ScreenMethod,
+    plan: &Plan,
+    mut screen: Option<&mut dyn ScreenMethod>,
     textured: &mut [Textured],
     mut step: impl FnMut(&str),
 ) -> Result<(Vec<Series>, Vec<String>), Error> {
-    let profiles = [Profile::SKIN];
     let mut skin = Vec::new();
     let mut on_screen = Vec::new();
     let mut in_texture = vec![Vec::<(f64, f64)>::new(); textured.len()];
     for (i, (heads, columns)) in HEADS.into_iter().enumerate() {
         step(&format!("{heads} heads"));
-        let scene = crowd(gpu, model, mm_per_unit, size, heads, columns)?;
+        let scene = crowd(gpu, model, mm_per_unit, plan.size, heads, columns)?;
         let Surface::Head(head) = &scene.surface else {
             continue;
         };
         skin.push(scene.pixels.len().to_string());
         let output = head.renderer.scattered_target(gpu);
-        screen.prepare(
-            &gpu.device,
-            &ScreenFrame {
-                irradiance: &scene.irradiance,
-                depth: &scene.depth,
-                profile_id: &scene.profile_id,
-                output: &output,
-                projection: scene.projection,
-                mm_per_unit,
-                profiles: &profiles,
-            },
-        )?;
-        gpu.run(|encoder| screen.render(encoder));
-        let ms = median_ms(|| {
-            let start = Instant::now();
-            gpu.run(|encoder| screen.render(encoder));
-            Ok(start.elapsed().as_secs_f64() * 1e3)
-        })?;
-        on_screen.push((heads as f64, 1e3 / ms));
+        if let Some(screen) = &mut screen {
+            screen.prepare(&gpu.device, &scene.frame(&output))?;
+            let ms = median_ms(plan, || {
+                let start = Instant::now();
+                gpu.run(|encoder| screen.render(encoder));
+                Ok(start.elapsed().as_secs_f64() * 1e3)
+            })?;
+            on_screen.push((heads as f64, 1e3 / ms));
+        }
         for (t, points) in textured.iter_mut().zip(&mut in_texture) {
             if i >= t.measured {
                 // Each head has an atlas of its own.
@@ -78,29 +65,20 @@ pub fn figure(
                 continue;
             }
             let atlas = AtlasRenderer::new(gpu, &head.renderer, t.size)?;
-            let ms = median_ms(|| {
-                let AtlasTimes { raster_ms, blur_ms } = atlas.render(
-                    gpu,
-                    &head.renderer,
-                    &profiles,
-                    mm_per_unit,
-                    &output,
-                    |atlas| {
-                        t.method.prepare(&gpu.device, atlas)?;
-                        gpu.run(|encoder| t.method.render(encoder));
-                        Ok(())
-                    },
-                )?;
-                Ok(raster_ms + blur_ms)
+            let ms = median_ms(plan, || {
+                time_atlas(gpu, &atlas, &head.renderer, t.method, mm_per_unit, &output)
             })?;
             points.push((heads as f64, 1e3 / ms));
         }
     }
-    let mut series = vec![Series {
-        name: "screen_exact".into(),
-        points: on_screen,
-        extrapolated_from: None,
-    }];
+    let mut series = Vec::new();
+    if screen.is_some() {
+        series.push(Series {
+            name: "screen_exact".into(),
+            points: on_screen,
+            extrapolated_from: None,
+        });
+    }
     for (t, points) in textured.iter().zip(in_texture) {
         series.push(Series {
             name: t.name.clone(),
@@ -113,10 +91,38 @@ pub fn figure(
     Ok((series, vec![note]))
 }
 
-fn median_ms(mut run: impl FnMut() -> Result<f64, Error>) -> Result<f64, Error> {
+/// Milliseconds that an atlas method takes, from drawing and lighting the atlas to done.
+///
+/// # Errors
+/// What the method or the renderer refuses.
+pub fn time_atlas(
+    gpu: &Gpu,
+    atlas: &AtlasRenderer,
+    renderer: &Renderer,
+    method: &mut dyn AtlasMethod,
+    mm_per_unit: f32,
+    output: &TextureView,
+) -> Result<f64, Error> {
+    let mut blur_ms = 0.0;
+    let profiles = [Profile::SKIN];
+    let raster_ms = atlas.render(gpu, renderer, &profiles, mm_per_unit, output, |atlas| {
+        method.prepare(&gpu.device, atlas)?;
+        let start = Instant::now();
+        gpu.run(|encoder| method.render(encoder));
+        blur_ms += start.elapsed().as_secs_f64() * 1e3;
+        Ok(())
+    })?;
+    Ok(raster_ms + blur_ms)
+}
+
+/// Of as many runs as there is time for, after one that warms up.
+fn median_ms(plan: &Plan, mut run: impl FnMut() -> Result<f64, Error>) -> Result<f64, Error> {
+    run()?;
     let since = Instant::now();
     let mut times = Vec::new();
-    while times.is_empty() || times.len() < RUNS && since.elapsed().as_secs_f64() < SECONDS {
+    while times.is_empty()
+        || times.len() < plan.atlas_runs && since.elapsed().as_secs_f64() < plan.atlas_seconds
+    {
         times.push(run()?);
     }
     Ok(crate::clock::median(&times))

@@ -21,7 +21,16 @@ pub struct Done {
     pub intervals: Vec<Interval>,
     pub heads: Vec<Series>,
     pub notes: Vec<String>,
-    pub pictures: Option<Images>,
+    pub visibility: Vec<Visibility>,
+    pub pictures: Vec<Images>,
+}
+
+/// What no method in screen space is spared: the visible integral against Eq. 7, relative RMSE.
+#[derive(Deserialize, Serialize)]
+pub struct Visibility {
+    pub scene: String,
+    pub rel_rmse_eq7: Option<f64>,
+    pub rel_rmse_eq7_normalised: Option<f64>,
 }
 
 /// How sure a multiple of the copy is.
@@ -56,7 +65,7 @@ impl Done {
         for (label, picture, error) in &images.entries {
             entries.push((label.clone(), text(picture)?, text(error)?));
         }
-        self.pictures = Some(Images {
+        self.pictures.push(Images {
             scene: images.scene.clone(),
             truth: text(&images.truth)?,
             entries,
@@ -65,13 +74,16 @@ impl Done {
     }
 
     /// The pictures that were kept.
-    pub fn images(&self) -> Option<Result<SceneImages, Error>> {
+    ///
+    /// # Errors
+    /// One that cannot be decoded.
+    pub fn images(&self) -> Result<Vec<SceneImages>, Error> {
         let picture = |text: &str| -> Result<RgbImage, Error> {
             let png = BASE64.decode(text).map_err(|e| bad_picture(&e))?;
             let picture = image::load_from_memory(&png).map_err(|e| bad_picture(&e))?;
             Ok(picture.into_rgb8())
         };
-        self.pictures.as_ref().map(|images| {
+        let all = self.pictures.iter().map(|images| {
             let mut entries = Vec::new();
             for (label, shown, error) in &images.entries {
                 entries.push((label.clone(), picture(shown)?, picture(error)?));
@@ -81,7 +93,8 @@ impl Done {
                 truth: picture(&images.truth)?,
                 entries,
             })
-        })
+        });
+        all.collect()
     }
 }
 
@@ -89,7 +102,7 @@ fn bad_picture(error: &dyn std::fmt::Display) -> Error {
     Error::new("picture", format!("\"{error}\""), "one that can be kept")
 }
 
-/// The finished scenes of one command, adapter and build.
+/// The finished scenes of one build, given the same settings.
 pub struct Progress {
     directory: PathBuf,
 }
@@ -97,12 +110,12 @@ pub struct Progress {
 impl Progress {
     /// # Errors
     /// A program that cannot read itself.
-    pub fn new(cache: &Path, adapter: &str, command: &str) -> Result<Self, Error> {
+    pub fn new(cache: &Path, settings: impl Hash) -> Result<Self, Error> {
         let program = std::env::current_exe()
             .and_then(std::fs::read)
             .map_err(|e| Error::new("chart", format!("\"{e}\""), "to read its own program"))?;
         let mut hasher = DefaultHasher::new();
-        (adapter, command, program).hash(&mut hasher);
+        (settings, program).hash(&mut hasher);
         Ok(Self {
             directory: cache.join(format!("run-{:016x}", hasher.finish())),
         })
@@ -149,18 +162,18 @@ mod tests {
         };
         done.keep_images(&images).unwrap();
 
-        let progress = Progress::new(&cache, "adapter", "chart").unwrap();
+        let progress = Progress::new(&cache, "chart").unwrap();
         assert!(progress.read("front").is_none());
         progress.keep("front", &done).unwrap();
-        let found = Progress::new(&cache, "adapter", "chart")
+        let found = Progress::new(&cache, "chart")
             .unwrap()
             .read("front")
             .unwrap();
         assert_eq!(found.notes, done.notes);
-        let found = found.images().unwrap().unwrap();
+        let found = found.images().unwrap().remove(0);
         assert_eq!(found.truth, picture);
         assert_eq!(found.entries, images.entries);
-        let other = Progress::new(&cache, "adapter", "chart --quick").unwrap();
+        let other = Progress::new(&cache, "chart --quick").unwrap();
         assert!(other.read("front").is_none());
         progress.forget();
         assert!(progress.read("front").is_none());

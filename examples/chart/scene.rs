@@ -7,7 +7,7 @@ use subsurface::renderer::{
 };
 use subsurface::truth::{Patch, Pixel, closed_form};
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Error, Profile};
+use subsurface::{Error, Profile, ScreenFrame};
 
 /// σ of red light in the skin profile, in mm, by which the edges are named.
 const RED_SIGMA_MM: f64 = 1.176;
@@ -16,7 +16,7 @@ const EDGES_PX: [f64; 8] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
 /// From this width on, the truth of an edge is asked for at so many times fewer pixels each way: it
 /// would take hours.
 const SPARSE_FROM_PX: f64 = 8.0;
-const SPARSE: u32 = 2;
+pub const SPARSE: u32 = 2;
 
 /// Names of the scenes, in the order in which they are run.
 pub fn names() -> Vec<String> {
@@ -104,7 +104,7 @@ impl Scene {
     /// Any view of heads.
     ///
     /// # Errors
-    /// A size that the device cannot render.
+    /// A size that the device cannot render; no skin in view.
     pub fn head(
         gpu: &Gpu,
         model: &Model,
@@ -125,6 +125,9 @@ impl Scene {
         let irradiance = gpu.read(&g.irradiance);
         let view = camera.view();
         let mm_per_px = 2.0 * (camera.fov_y / 2.0).tan() / size[1] as f32;
+        if !skin.contains(&true) {
+            return Err(Error::new(name, "no skin in view", "a model that scatters"));
+        }
         let pixels = (0..skin.len()).filter(|i| skin[*i]).map(|i| {
             let [x, y, z, area_mm2] = visible[i];
             let point_mm = Vec3::new(x, y, z);
@@ -155,6 +158,19 @@ impl Scene {
         })
     }
 
+    /// As methods take it.
+    pub fn frame<'a>(&'a self, output: &'a TextureView) -> ScreenFrame<'a> {
+        ScreenFrame {
+            irradiance: &self.irradiance,
+            depth: &self.depth,
+            profile_id: &self.profile_id,
+            output,
+            projection: self.projection,
+            mm_per_unit: self.mm_per_unit,
+            profiles: &[Profile::SKIN],
+        }
+    }
+
     /// Size of the pictures of the pixels that the truth is asked for.
     pub fn asked_size(&self) -> [u32; 2] {
         self.size.map(|s| s.div_ceil(self.stride))
@@ -173,7 +189,7 @@ pub fn rgb([r, g, b, _]: [f32; 4]) -> Vec3 {
     Vec3::new(r, g, b)
 }
 
-/// Triangles of a primitive in mm.
+/// Corners of a primitive's triangles in mm.
 pub fn vertices_mm(primitive: &Primitive, mm_per_unit: f32) -> impl Iterator<Item = Vec3> {
     let positions = primitive.vertices.iter().map(|v| Vec3::from(v.position));
     positions.map(move |p| p * mm_per_unit)

@@ -16,6 +16,8 @@ pub struct Score<'a> {
     truths: &'a Truths,
     size: [u32; 2],
     albedo: Vec<Vec3>,
+    /// Light as it fell, which pictures show where nothing is compared.
+    fallen: Vec<Vec3>,
     /// Skin, without the rim of a pixel, whose light is as much the background's.
     inner: Vec<bool>,
     area_mm2: Vec<f64>,
@@ -29,7 +31,8 @@ pub enum Knows {
 }
 
 impl<'a> Score<'a> {
-    pub fn new(scene: &Scene, truths: &'a Truths) -> Self {
+    /// `fallen` is the scene's irradiance, at the pixels that were asked for.
+    pub fn new(scene: &Scene, truths: &'a Truths, fallen: Vec<Vec3>) -> Self {
         let [width, height] = scene.size;
         let inner = metrics::erode(&scene.skin, width, height, 1);
         let mut pixels = scene.pixels.iter();
@@ -42,6 +45,7 @@ impl<'a> Score<'a> {
             truths,
             size: scene.asked_size(),
             albedo: scene.asked(&scene.albedo),
+            fallen,
             inner: scene.asked(&inner),
             area_mm2: scene.asked(&area_mm2),
         }
@@ -59,7 +63,7 @@ impl<'a> Score<'a> {
         self.layer(values.iter().zip(&self.albedo).map(|(e, a)| e * a))
     }
 
-    fn truth(&self, knows: Knows) -> &[Vec3] {
+    pub fn truth(&self, knows: Knows) -> &[Vec3] {
         match knows {
             Knows::Frame => &self.truths.visible,
             Knows::Mesh => &self.truths.normalised,
@@ -96,9 +100,23 @@ impl<'a> Score<'a> {
         row.energy_ratio = Some(energy(result) / energy(truth)).filter(|r| r.is_finite());
     }
 
-    /// Light times albedo, as sRGB; brighter than white is white.
+    /// How far the two truths are apart, which no method in screen space is spared: relative RMSE of
+    /// the visible integral against Eq. 7 as printed, and normalised.
+    pub fn visibility_error(&self) -> [Option<f64>; 2] {
+        let plain = |values: &[Vec3]| self.layer(values.iter().copied());
+        let visible = plain(&self.truths.visible);
+        [&self.truths.printed, &self.truths.normalised]
+            .map(|eq7| metrics::relative_rmse(&visible, &plain(eq7), &self.inner))
+    }
+
+    /// Light times albedo, as sRGB; brighter than white is white. All pictures are the same where
+    /// nothing is compared, so that FLIP does not see it.
     pub fn picture(&self, values: &[Vec3]) -> RgbImage {
-        let lit = self.lit(values);
+        let pixels = values.iter().zip(&self.fallen).zip(&self.inner);
+        let shown: Vec<Vec3> = pixels
+            .map(|((v, e), inner)| if *inner { *v } else { *e })
+            .collect();
+        let lit = self.lit(&shown);
         RgbImage::from_fn(lit.width, lit.height, |x, y| {
             let pixel = lit.pixels[(y * lit.width + x) as usize];
             Rgb(pixel.map(|c| {

@@ -24,16 +24,20 @@ pub struct Truths {
 }
 
 /// What the truths are made by; as they change, so does the name.
-const SOURCES: [&str; 9] = [
+const SOURCES: [&str; 13] = [
     include_str!("../../src/truth/cloud.rs"),
     include_str!("../../src/truth/closed_form.rs"),
     include_str!("../../src/truth/surface.rs"),
     include_str!("../../src/truth/tree.rs"),
     include_str!("../../src/truth/visible.rs"),
+    include_str!("../../src/renderer/camera.rs"),
+    include_str!("../../src/renderer/lighting.rs"),
     include_str!("../../src/renderer/probe.rs"),
     include_str!("../../shaders/renderer/lighting.wgsl"),
     include_str!("../../shaders/renderer/material.wgsl"),
     include_str!("../../shaders/renderer/probe.wgsl"),
+    include_str!("../../shaders/renderer/shadow.wgsl"),
+    include_str!("truths.rs"),
 ];
 
 impl Truths {
@@ -197,19 +201,25 @@ pub fn eq7(
     integral
 }
 
+/// All that a model is.
+pub fn hash_model(model: &Model, hasher: &mut DefaultHasher) {
+    for p in &model.primitives {
+        bytemuck::cast_slice::<_, u8>(&p.vertices).hash(hasher);
+        (&p.indices, p.material, p.procedural).hash(hasher);
+    }
+    for image in &model.images {
+        (image.width, image.height, &image.rgba8).hash(hasher);
+    }
+    format!("{:?}", model.materials).hash(hasher);
+}
+
 /// A number for all that the truths follow from. `DefaultHasher` may change with the compiler; then
 /// they are computed once more.
 fn key(model: &Model, scene: &Scene, profile: &Profile) -> u64 {
     let mut hasher = DefaultHasher::new();
     SOURCES.hash(&mut hasher);
-    for p in &model.primitives {
-        bytemuck::cast_slice::<_, u8>(&p.vertices).hash(&mut hasher);
-        p.indices.hash(&mut hasher);
-    }
-    for image in &model.images {
-        image.rgba8.hash(&mut hasher);
-    }
-    format!("{:?} {:?} {}", model.materials, profile, scene.mm_per_unit).hash(&mut hasher);
+    hash_model(model, &mut hasher);
+    format!("{profile:?} {}", scene.mm_per_unit).hash(&mut hasher);
     for p in &scene.pixels {
         let Patch {
             point_mm,
@@ -220,8 +230,11 @@ fn key(model: &Model, scene: &Scene, profile: &Profile) -> u64 {
             v.to_array().map(f32::to_bits).hash(&mut hasher);
         }
     }
-    scene.skin.hash(&mut hasher);
-    scene.stride.hash(&mut hasher);
+    match &scene.surface {
+        Surface::Known(known) => bytemuck::cast_slice::<Vec3, u8>(known).hash(&mut hasher),
+        Surface::Head(head) => format!("{:?}", head.camera).hash(&mut hasher),
+    }
+    (&scene.skin, scene.stride).hash(&mut hasher);
     hasher.finish()
 }
 

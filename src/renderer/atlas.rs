@@ -19,15 +19,6 @@ pub struct AtlasRenderer {
     resample_group: wgpu::BindGroup,
 }
 
-/// Wall time of the two halves of scattering in texture space, submit and wait, in ms.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct AtlasTimes {
-    /// Drawing and lighting the meshes in their UV space.
-    pub raster_ms: f64,
-    /// The effect.
-    pub blur_ms: f64,
-}
-
 impl AtlasRenderer {
     /// An atlas of `size` × `size` texels a page.
     ///
@@ -162,7 +153,8 @@ impl AtlasRenderer {
 
     /// Has the scene scattered as `renderer` last lit it and draws the result into `output`, which
     /// elsewhere takes the irradiance as it was. `scatter` fills the output of the atlas that it is
-    /// handed, of `output`'s format, and waits for it.
+    /// handed, of `output`'s format, and waits for it. Returns the wall time of drawing and lighting
+    /// the atlases, submit and wait, in ms; that of `scatter` is the caller's to take.
     ///
     /// # Errors
     /// A primitive that scatters and has no UVs; those of `scatter`.
@@ -174,7 +166,7 @@ impl AtlasRenderer {
         mm_per_unit: f32,
         output: &wgpu::TextureView,
         mut scatter: impl FnMut(&Atlas) -> Result<(), Error>,
-    ) -> Result<AtlasTimes, Error> {
+    ) -> Result<f64, Error> {
         let scatters = 1..=profiles.len();
         let skin = || {
             let meshes = renderer.meshes.iter();
@@ -194,14 +186,13 @@ impl AtlasRenderer {
                 output.texture().size(),
             );
         });
-        let mut times = AtlasTimes::default();
+        let mut raster_ms = 0.0;
         for mesh in skin() {
             for page in &mesh.pages {
                 let start = Instant::now();
                 gpu.run(|encoder| self.draw_atlas(encoder, renderer, mesh, page.clone()));
-                times.raster_ms += start.elapsed().as_secs_f64() * 1e3;
+                raster_ms += start.elapsed().as_secs_f64() * 1e3;
 
-                let start = Instant::now();
                 scatter(&Atlas {
                     irradiance: &self.irradiance,
                     positions: &self.positions,
@@ -209,12 +200,11 @@ impl AtlasRenderer {
                     mm_per_unit,
                     profiles,
                 })?;
-                times.blur_ms += start.elapsed().as_secs_f64() * 1e3;
 
                 gpu.run(|encoder| self.draw_screen(encoder, renderer, mesh, page.clone(), output));
             }
         }
-        Ok(times)
+        Ok(raster_ms)
     }
 
     fn draw_atlas(

@@ -61,6 +61,28 @@ impl Gpu {
         })
     }
 
+    /// Whether pictures of this size can be rendered and read back.
+    ///
+    /// # Errors
+    /// A size of 0 or beyond the device's limits.
+    pub fn check_size(&self, size: [u32; 2]) -> Result<(), Error> {
+        let limits = self.device.limits();
+        let limit = limits.max_texture_dimension_2d;
+        // Pictures are read back as full floats, in rows of a multiple of 256 bytes.
+        let bytes = u64::from(size[0].div_ceil(16)) * 256 * u64::from(size[1]);
+        if size.iter().any(|&s| s == 0 || s > limit) || bytes > limits.max_buffer_size {
+            return Err(Error::new(
+                "size",
+                format!("{}x{}", size[0], size[1]),
+                format!(
+                    "1 to {limit} pixels each way, {} in all",
+                    limits.max_buffer_size / 16
+                ),
+            ));
+        }
+        Ok(())
+    }
+
     /// A texture of its own that passes render to and read from, and that can be copied out.
     pub fn target(&self, label: &str, size: [u32; 2], format: TextureFormat) -> TextureView {
         self.device

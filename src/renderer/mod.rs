@@ -14,7 +14,7 @@ mod pages;
 mod probe;
 mod scene;
 
-pub use atlas::{AtlasRenderer, AtlasTimes};
+pub use atlas::AtlasRenderer;
 pub use camera::{Camera, View};
 pub use gpu::Gpu;
 pub use lighting::{Light, Lighting, Sky, Specular};
@@ -104,20 +104,7 @@ impl Renderer {
     /// A size of 0 or beyond the device's limits; a primitive that is too large for a buffer.
     pub fn new(gpu: &Gpu, scene: &Scene, size: [u32; 2]) -> Result<Self, Error> {
         let device = &gpu.device;
-        let limits = device.limits();
-        let limit = limits.max_texture_dimension_2d;
-        // Pictures are read back as full floats, in rows of a multiple of 256 bytes.
-        let bytes = u64::from(size[0].div_ceil(16)) * 256 * u64::from(size[1]);
-        if size.iter().any(|&s| s == 0 || s > limit) || bytes > limits.max_buffer_size {
-            return Err(Error::new(
-                "size",
-                format!("{}x{}", size[0], size[1]),
-                format!(
-                    "1 to {limit} pixels each way, {} in all",
-                    limits.max_buffer_size / 16
-                ),
-            ));
-        }
+        gpu.check_size(size)?;
         let target = |name, format| gpu.target(name, size, format);
         let gbuffer = GBuffer {
             albedo: target("subsurface::renderer albedo", TextureFormat::Rgba16Float),

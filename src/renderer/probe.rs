@@ -155,7 +155,7 @@ impl Probe {
 
     /// Irradiance/π at places of the scene's `primitive`, by the lights as `renderer` last drew them.
     /// A place is the number of a triangle and the shares of its corners. Detail is filtered as in a
-    /// picture that `camera` takes; alpha is not looked at.
+    /// picture that `camera` takes; alpha is not looked at, and the outside alone is lit.
     pub fn irradiance(
         &self,
         gpu: &Gpu,

@@ -18,9 +18,11 @@ use super::pass::{Pass, Slot, linear_sampler, scratch, size};
 use crate::method::ScreenMethod;
 
 /// Depth difference, as a multiple of the kernel's width, from which a tap takes the center's
-/// light. The demo has s = 300 · distance to the projection window · width · |Δz| in units of its
-/// scene: with its field of view of 20° and its width of .012, s = 1 at .049 units, or 4.08 widths.
-const WIDTHS_SATURATE: f64 = 1.0 / (300.0 * 5.671 * 0.012 * 0.012);
+/// light. The demo has s = 300 · distance to the projection window · `sssWidth` · |Δz| in units of
+/// its scene: with its field of view of 20° and its `sssWidth` of .012, s = 1 at 4.08 `sssWidth`. Its
+/// outermost tap lies `sssWidth` · distance / z of the frame away, which is 2z / distance tall: the
+/// width is two of them.
+const WIDTHS_SATURATE: f64 = 0.5 / (300.0 * 5.671 * 0.012 * 0.012);
 
 /// A kernel of 2n + 1 taps: the center and n pairs.
 #[derive(Clone, Debug)]
@@ -29,7 +31,7 @@ pub struct Kernel {
     pub offsets_mm: Vec<f64>,
     /// Weight of each pair, both taps together; they sum to 1.
     pub weights: Vec<DVec3>,
-    /// The demo's `sssWidth`, to which its taps scale.
+    /// Where the demo's outermost tap is, to which all taps scale.
     width_mm: f64,
     /// The worst error on the edges that it was fitted on.
     pub worst: f64,
