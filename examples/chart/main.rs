@@ -191,8 +191,8 @@ fn notes(plan: &Plan) -> Vec<String> {
     vec![
         "Errors are of irradiance/π over skin, a rim of one pixel left out.".into(),
         format!(
-            "Truths are summed at every {stride}th pixel each way, at every {}th of edges from 8 px on; errors, \
-             ΔE2000 and FLIP are of these pixels, so that FLIP sees a picture that much smaller.",
+            "Truths are summed at one pixel in {stride} each way, one in {} on edges from 8 px on; errors, ΔE2000 \
+             and FLIP are of these pixels, so that FLIP sees a picture that much smaller.",
             scene::SPARSE * stride
         ),
         "Screen-space methods are compared with the visible integral, in colour differences and energy, \
