@@ -135,20 +135,23 @@ fn gaussian(here: Point, i: u32) -> vec4f {
     return settings.gaussians[8u * (here.profile - 1u) + i];
 }
 
-// The variance that point weights need to spread by v on a lattice of this spacing.
+// The variance whose point weights, on a lattice of this spacing, pass a wave of 1.1 rad/px as the
+// Gaussian does: light that is soft by a pixel comes out right.
 //
-// Point weights of a Gaussian under ~ .6 px spread less than it does: with w = e^(−1/2s) at the
-// next pixel, (2w + 8w⁴)/(1 + 2w + 2w⁴) px² instead of s px². Solved for w.
+// Point weights of a Gaussian under ~ .6 px spread less than it does: with w = e^(−1/2s) at the next
+// pixel they pass (1 + 2w cos 1.1 + 2w⁴ cos 2.2)/(1 + 2w + 2w⁴) of the wave instead of e^(−1.1² s/2).
+// Solved for w.
 fn lattice_variance(variance_mm2: f32, spacing: f32) -> f32 {
     let px2 = max(spacing * spacing, 1e-20);
     let s = variance_mm2 / px2;
     if s > 0.4 || s < 1e-6 {
         return variance_mm2;
     }
-    var w = 0.5 * s / (1.0 - s);
+    let passed = exp(-0.605 * s);
+    var w = 0.5 * (1.0 - passed) / (passed - 0.45360);
     for (var step = 0; step < 6; step++) {
         let w4 = w * w * w * w;
-        w = 0.5 * (s - (8.0 - 2.0 * s) * w4) / (1.0 - s);
+        w = 0.5 * (1.0 - passed - 2.0 * (passed + 0.58850) * w4) / (passed - 0.45360);
     }
     return -0.5 * px2 / log(w);
 }
