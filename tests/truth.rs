@@ -137,9 +137,6 @@ fn assert_within(
     assert!(worst <= tolerance, "{what}: {worst}");
 }
 
-/// A piece of a mesh holds its light, which blurs what changes within tenths of a mm: .00100 measured.
-const HELD_LIGHT: f64 = 0.0011;
-
 /// Narrow Gaussians on pixels: .00052 measured, at 5 px/mm, since weights that are not negative
 /// cannot pass two waves as a Gaussian does.
 const ON_PIXELS: f64 = 0.0006;
@@ -196,8 +193,8 @@ fn the_surface_integral_knows_edges_at_any_angle_and_tilt() {
                     .map(|x| scattered_step(*x, blur_mm2, &Profile::SKIN))
             };
             let what = format!("edge at {angle}°, tilted by {tilt}°, soft by {blur_mm2} mm²");
-            assert_within(HELD_LIGHT, &what, &found.printed, expected());
-            assert_within(HELD_LIGHT, &what, &found.normalised, expected());
+            assert_exact(&what, &found.printed, expected());
+            assert_exact(&what, &found.normalised, expected());
         }
     }
 }
@@ -218,13 +215,8 @@ fn the_surface_integral_knows_a_disc() {
     };
     let found = Mesh::square(60.0, DVec3::ZERO, DMat3::IDENTITY).integral(&asked, light);
     let expected = || rs.iter().map(|r| scattered_disc(*r, radius, blur));
-    assert_within(HELD_LIGHT, "disc", &found.printed, expected());
-    assert_within(
-        HELD_LIGHT,
-        "disc, normalised",
-        &found.normalised,
-        expected(),
-    );
+    assert_exact("disc", &found.printed, expected());
+    assert_exact("disc, normalised", &found.normalised, expected());
 }
 
 #[test]

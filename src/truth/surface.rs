@@ -41,7 +41,7 @@ pub struct SurfaceIntegral {
 
 /// Side of a sample's area over σ, at a density of 1, and at most so many mm, which is what light
 /// itself asks for: pores, and the edges of shadows.
-const SPACING_SIGMAS: f32 = 0.5;
+const SPACING_SIGMAS: f32 = 0.47;
 const SPACING_MM: f32 = 0.2;
 
 /// Places that light is asked for at once.
@@ -85,24 +85,27 @@ pub fn surface_integral<E>(
         let reach_mm = REACH_SIGMAS * widest.sqrt();
         let pieces = cut(mesh, &points, reach_mm, *spacing_mm);
         let share = 0.5 / groups.len() as f64;
-        let mut patches = Vec::with_capacity(3 * pieces.len());
+        let mut lit = Vec::with_capacity(pieces.len());
         for batch in pieces.chunks(BATCH) {
             let places: Vec<Place> = batch.iter().map(|p| p.place).collect();
             for (piece, irradiance) in batch.iter().zip(light(&places)?) {
-                patches.extend(piece.thirds(irradiance));
+                lit.push(piece.middle(irradiance));
             }
             progress(share * batch.len() as f64 / pieces.len() as f64);
         }
         result.samples += pieces.len();
+        let lit = Cloud::new(&lit);
+        let surface: Vec<Patch> = pieces.iter().flat_map(Piece::thirds).collect();
+        let surface = Cloud::new(&surface);
         drop(pieces);
-        let cloud = Cloud::new(&patches);
         let sums = |p: &Patch| {
             let mut sums = [Vec3::ZERO; 2];
             for g in gaussians {
-                let sum = cloud.sum(p.point_mm, g.variance_mm2);
-                let light = sum.light.as_vec3();
-                sums[0] += g.weight * light / (TAU * g.variance_mm2);
-                sums[1] += g.weight * light / sum.mass as f32;
+                let lit = lit.sum(p.point_mm, g.variance_mm2);
+                let mean = g.weight * (lit.light / lit.mass).as_vec3();
+                let mass = surface.sum(p.point_mm, g.variance_mm2).mass as f32;
+                sums[0] += mean * mass / (TAU * g.variance_mm2);
+                sums[1] += mean;
             }
             progress(share / asked.len() as f64);
             sums
@@ -151,15 +154,29 @@ struct Piece {
 }
 
 impl Piece {
-    /// Three points that stand for the triangle: a sum over them is right for all that is quadratic
-    /// across it, so that its mass does not depend on how a mesh is cut.
-    fn thirds(&self, irradiance: Vec3) -> [Patch; 3] {
+    fn area_mm2(&self) -> f32 {
         let [a, b, c] = self.corners_mm;
-        let area_mm2 = (b - a).cross(c - a).length() / 6.0;
-        self.corners_mm.map(|corner| Patch {
-            point_mm: (a + b + c + 3.0 * corner) / 6.0,
-            area_mm2,
+        (b - a).cross(c - a).length() / 2.0
+    }
+
+    /// The point where it is lit. Light that the whole piece held would be blurred by its width; from
+    /// one point it is not, and what the point misses of the mass divides out of the mean of E.
+    fn middle(&self, irradiance: Vec3) -> Patch {
+        Patch {
+            point_mm: self.corners_mm.iter().sum::<Vec3>() / 3.0,
+            area_mm2: self.area_mm2(),
             irradiance,
+        }
+    }
+
+    /// Three points that stand for its area: a sum over them is right for all that is quadratic
+    /// across it, so that the mass does not depend on how a mesh is cut.
+    fn thirds(&self) -> [Patch; 3] {
+        let sum_mm = self.corners_mm.iter().sum::<Vec3>();
+        self.corners_mm.map(|corner| Patch {
+            point_mm: (sum_mm + 3.0 * corner) / 6.0,
+            area_mm2: self.area_mm2() / 3.0,
+            irradiance: Vec3::ZERO,
         })
     }
 }
