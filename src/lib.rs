@@ -11,6 +11,7 @@
 mod error;
 mod gaussian_sum;
 mod input;
+mod plan;
 mod profile;
 #[cfg(feature = "renderer")]
 pub mod renderer;
@@ -22,6 +23,7 @@ pub mod truth;
 mod wgsl;
 
 pub use error::Error;
+pub use plan::{Plan, Row};
 pub use profile::{Gaussian, Profile};
 pub use screen_space::{ScreenFrame, ScreenSpace};
 pub use texture_space::{Atlas, TextureSpace};
