@@ -12,7 +12,9 @@ mod error;
 mod gaussian_sum;
 mod input;
 mod plan;
+mod planned;
 mod profile;
+mod pyramid;
 #[cfg(feature = "renderer")]
 pub mod renderer;
 mod screen_space;
@@ -24,6 +26,7 @@ mod wgsl;
 
 pub use error::Error;
 pub use plan::{Plan, Row};
+pub use planned::PlannedScreenSpace;
 pub use profile::{Gaussian, Profile};
 pub use screen_space::{ScreenFrame, ScreenSpace};
 pub use texture_space::{Atlas, TextureSpace};

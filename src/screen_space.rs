@@ -103,26 +103,8 @@ impl ScreenSpace {
     /// # Errors
     /// The first input that does not fit; the frame prepared before stays in place.
     pub fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<(), Error> {
+        check(frame, self.output_format)?;
         let size = input::size(frame.irradiance);
-        input::check_texture("irradiance", frame.irradiance, Role::Color, size)?;
-        input::check_texture("depth", frame.depth, Role::Depth, size)?;
-        input::check_texture("profile_id", frame.profile_id, Role::Id, size)?;
-        input::check_texture(
-            "output",
-            frame.output,
-            Role::Target(self.output_format),
-            size,
-        )?;
-        input::check_apart(
-            frame.output,
-            &[
-                ("irradiance", frame.irradiance),
-                ("depth", frame.depth),
-                ("profile_id", frame.profile_id),
-            ],
-        )?;
-        input::check_mm_per_unit(frame.mm_per_unit)?;
-        input::check_profiles(frame.profiles)?;
         let inverse_projection = inverse_mm(frame.projection, frame.mm_per_unit)?;
 
         let settings = gaussian_sum::uniform(
@@ -185,9 +167,29 @@ impl ScreenSpace {
     }
 }
 
+/// Checks all of a frame but its projection.
+pub(crate) fn check(frame: &ScreenFrame, output_format: TextureFormat) -> Result<(), Error> {
+    let size = input::size(frame.irradiance);
+    input::check_texture("irradiance", frame.irradiance, Role::Color, size)?;
+    input::check_texture("depth", frame.depth, Role::Depth, size)?;
+    input::check_texture("profile_id", frame.profile_id, Role::Id, size)?;
+    input::check_texture("output", frame.output, Role::Target(output_format), size)?;
+    input::check_apart(
+        frame.output,
+        &[
+            ("irradiance", frame.irradiance),
+            ("depth", frame.depth),
+            ("profile_id", frame.profile_id),
+        ],
+    )?;
+    input::check_mm_per_unit(frame.mm_per_unit)?;
+    input::check_profiles(frame.profiles)?;
+    Ok(())
+}
+
 /// Normalised device coordinates to view space in mm. In double precision, since the inverse of a
 /// projection with a near plane of a millimetre loses half of a float's digits.
-fn inverse_mm(projection: Mat4, mm_per_unit: f32) -> Result<Mat4, Error> {
+pub(crate) fn inverse_mm(projection: Mat4, mm_per_unit: f32) -> Result<Mat4, Error> {
     let m = projection.as_dmat4();
     let (x, y) = (projection.row(0), projection.row(1));
     let inverse = DMat4::from_scale(DVec3::splat(mm_per_unit.into())) * m.inverse();

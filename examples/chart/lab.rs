@@ -7,11 +7,11 @@ use image::RgbImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use subsurface::renderer::{AtlasRenderer, Gpu, Scene as Model};
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Error, Profile, ScreenSpace, TextureSpace};
+use subsurface::{Error, PlannedScreenSpace, Profile, ScreenSpace, TextureSpace};
 
 use crate::clock;
 use crate::heads::{self, HEADS, Textured, time_atlas};
-use crate::method::{AtlasMethod, ScreenMethod};
+use crate::method::{AtlasMethod, Planned, ScreenMethod};
 use crate::options::{Options, Plan};
 use crate::progress::{Done, Interval, Visibility};
 use crate::report::SceneImages;
@@ -25,10 +25,11 @@ use crate::truths::Truths;
 const OUTPUT: TextureFormat = TextureFormat::Rgba16Float;
 
 /// All methods by name.
-pub const METHODS: [&str; 10] = [
+pub const METHODS: [&str; 11] = [
     "copy",
     "none",
     "screen_exact",
+    "screen_planned",
     "jimenez_2009",
     "jimenez_separable",
     "fitted_separable",
@@ -39,12 +40,17 @@ pub const METHODS: [&str; 10] = [
 ];
 
 /// Methods that are compared by the ratio of their times, and so are timed more often.
-const COMPARED: [(&str, &str); 4] = [
+const COMPARED: [(&str, &str); 6] = [
     ("copy", ""),
     ("screen_exact", ""),
+    ("screen_planned", "1/100"),
+    ("screen_planned", "1/255"),
     ("jimenez_separable", "17"),
     ("fitted_separable", "17"),
 ];
+
+/// Errors that are asked for: one in so many.
+const PLANNED: [u16; 2] = [100, 255];
 
 /// Side of the pictures in the report, at most.
 const THUMBNAIL: u32 = 256;
@@ -54,6 +60,8 @@ pub struct Lab<'a> {
     pub gpu: Gpu,
     pub plan: Plan,
     pub bar: ProgressBar,
+    /// Of the skin profile, by the error that they keep.
+    plans: Vec<(String, subsurface::Plan)>,
     model: Model,
     options: &'a Options,
 }
@@ -67,10 +75,16 @@ impl<'a> Lab<'a> {
         gpu.check_size(plan.size)?;
         let style = ProgressStyle::with_template("{bar:24} {msg}");
         let bar = ProgressBar::no_length().with_style(style.expect("the template is a constant"));
+        let mut plans = Vec::new();
+        for steps in PLANNED {
+            let plan = subsurface::Plan::new(&[Profile::SKIN], 1.0 / f32::from(steps))?;
+            plans.push((format!("1/{steps}"), plan));
+        }
         Ok(Self {
             gpu,
             plan,
             bar,
+            plans,
             model,
             options,
         })
@@ -122,6 +136,17 @@ impl<'a> Lab<'a> {
         let mut methods = rivals::screen(&gpu.device, OUTPUT, &Profile::SKIN)?;
         let exact = ScreenSpace::new(&gpu.device, OUTPUT)?;
         methods.insert(1, ("screen_exact", String::new(), Box::new(exact)));
+        for (i, (setting, plan)) in self.plans.iter().enumerate() {
+            let planned = Planned {
+                effect: PlannedScreenSpace::new(&gpu.device, OUTPUT)?,
+                queue: gpu.queue.clone(),
+                plan: plan.clone(),
+            };
+            methods.insert(
+                2 + i,
+                ("screen_planned", setting.clone(), Box::new(planned)),
+            );
+        }
         methods.retain(|(name, ..)| self.wanted(name));
         self.begin(format!("{}: warming up", scene.name), methods.len());
         let output = gpu.target("scattered", scene.size, OUTPUT);

@@ -1,8 +1,10 @@
 //! What the chart times: a way to scatter a frame, or an atlas. Each takes what a host hands over
 //! and gives what a host gets back.
 
-use subsurface::wgpu::{CommandEncoder, Device};
-use subsurface::{Atlas, Error, Profile, ScreenFrame, ScreenSpace, TextureSpace};
+use subsurface::wgpu::{CommandEncoder, Device, Queue};
+use subsurface::{
+    Atlas, Error, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace, TextureSpace,
+};
 
 /// A method over a frame of a deferred renderer.
 pub trait ScreenMethod {
@@ -58,6 +60,31 @@ impl ScreenMethod for ScreenSpace {
 
     fn scratch_bytes_per_pixel(&self) -> f64 {
         80.0
+    }
+}
+
+/// Scattering in screen space at a stated error.
+pub struct Planned {
+    pub effect: PlannedScreenSpace,
+    pub queue: Queue,
+    pub plan: Plan,
+}
+
+impl ScreenMethod for Planned {
+    fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<(), Error> {
+        self.effect.prepare(device, &self.queue, frame, &self.plan)
+    }
+
+    fn render(&self, encoder: &mut CommandEncoder) {
+        self.effect.render(encoder);
+    }
+
+    fn fetches(&self, _px_per_mm: f64) -> Option<f64> {
+        None
+    }
+
+    fn scratch_bytes_per_pixel(&self) -> f64 {
+        24.0
     }
 }
 

@@ -7,8 +7,8 @@ use std::sync::OnceLock;
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 use subsurface::renderer::Gpu;
 use subsurface::truth::{self, Patch, Pixel};
-use subsurface::wgpu::TextureFormat;
-use subsurface::{Profile, ScreenFrame, ScreenSpace};
+use subsurface::wgpu::{CommandEncoder, TextureFormat};
+use subsurface::{Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace};
 
 /// The device of this test binary. Without an adapter the test fails and says what to do.
 pub fn gpu() -> &'static Gpu {
@@ -147,6 +147,33 @@ impl GBuffer {
     }
 
     pub fn scatter_all(&self, profiles: &[Profile], format: TextureFormat) -> Vec<[f32; 4]> {
+        let device = &gpu().device;
+        let mut effect = ScreenSpace::new(device, format).unwrap();
+        self.render(profiles, format, |frame, encoder| {
+            effect.prepare(device, frame).unwrap();
+            effect.render(encoder);
+        })
+    }
+
+    /// The effect by a plan of these profiles, with full floats in and out.
+    pub fn scatter_planned(&self, profiles: &[Profile], plan: &Plan) -> Vec<[f32; 4]> {
+        let format = TextureFormat::Rgba32Float;
+        let mut effect = PlannedScreenSpace::new(&gpu().device, format).unwrap();
+        self.render(profiles, format, |frame, encoder| {
+            effect
+                .prepare(&gpu().device, &gpu().queue, frame, plan)
+                .unwrap();
+            effect.render(encoder);
+        })
+    }
+
+    /// What an effect makes of the frame.
+    fn render(
+        &self,
+        profiles: &[Profile],
+        format: TextureFormat,
+        effect: impl FnOnce(&ScreenFrame, &mut CommandEncoder),
+    ) -> Vec<[f32; 4]> {
         let gpu = gpu();
         let size = self.view.size;
         let mut irradiance = Vec::new();
@@ -162,27 +189,17 @@ impl GBuffer {
             id.push(hit.map_or(0, |h| h.id as u8));
         }
         let output = gpu.target("output", size, format);
-        let mut effect = ScreenSpace::new(&gpu.device, format).unwrap();
-        effect
-            .prepare(
-                &gpu.device,
-                &ScreenFrame {
-                    irradiance: &gpu.upload(
-                        "irradiance",
-                        size,
-                        TextureFormat::Rgba32Float,
-                        &irradiance,
-                    ),
-                    depth: &gpu.upload("depth", size, TextureFormat::R32Float, &depth),
-                    profile_id: &gpu.upload("profile id", size, TextureFormat::R8Uint, &id),
-                    output: &output,
-                    projection: self.view.projection.as_mat4(),
-                    mm_per_unit: 1.0,
-                    profiles,
-                },
-            )
-            .unwrap();
-        gpu.run(|encoder| effect.render(encoder));
+        let full = TextureFormat::Rgba32Float;
+        let frame = ScreenFrame {
+            irradiance: &gpu.upload("irradiance", size, full, &irradiance),
+            depth: &gpu.upload("depth", size, TextureFormat::R32Float, &depth),
+            profile_id: &gpu.upload("profile id", size, TextureFormat::R8Uint, &id),
+            output: &output,
+            projection: self.view.projection.as_mat4(),
+            mm_per_unit: 1.0,
+            profiles,
+        };
+        gpu.run(|encoder| effect(&frame, encoder));
         gpu.read(&output)
     }
 

@@ -1,0 +1,417 @@
+//! The plan: how much of which blur makes a profile, at every scale, to a stated error.
+
+mod nnls;
+mod response;
+
+use std::fmt;
+
+use glam::{DVec3, Vec3, Vec4};
+
+use crate::{Error, Profile};
+use response::Responses;
+
+/// Blurs of one resolution: Gaussians, each cut off by a shape of taps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Taps {
+    /// Variances in square pixels of their level, and how many pixels their taps reach along an
+    /// axis; from the narrowest on.
+    pub blurs: &'static [(f64, i32)],
+    /// Whether the taps are those of |x| + |y| ≤ reach, not of the whole square.
+    pub diamond: bool,
+}
+
+/// The blurs that a plan is made of: `fine` ones of the frame itself, of which each scale uses the
+/// first few, and `coarse` ones of each level, whose variances hold what the pyramid blurs by itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Kernels {
+    pub fine: Taps,
+    pub coarse: Taps,
+}
+
+/// From the cheapest to the most exact. Levels double, so variances of a level are those of the one
+/// before, four times; whatever lies between is mixed.
+pub(crate) const KERNELS: [Kernels; 2] = [
+    Kernels {
+        fine: Taps {
+            blurs: &[(0.5, 1)],
+            diamond: false,
+        },
+        coarse: Taps {
+            blurs: &[(0.9, 1)],
+            diamond: false,
+        },
+    },
+    Kernels {
+        fine: Taps {
+            blurs: &[(0.5, 2), (0.95, 2), (1.9, 4)],
+            diamond: true,
+        },
+        coarse: Taps {
+            blurs: &[(1.0, 2), (1.6, 2)],
+            diamond: false,
+        },
+    },
+];
+
+/// Variance in square pixels of level `l` that going there and back blurs by: ¾·4ʲ on the way down
+/// and as much on the way up, for each level j below.
+pub(crate) fn own_blur(level: usize) -> f64 {
+    0.5 * (1.0 - f64::powi(0.25, level as i32))
+}
+
+impl Taps {
+    /// The variance that the weights of blur `i` need so that, cut off, they have `variance`.
+    pub fn exponent(&self, i: usize, variance: f64) -> f64 {
+        let reach = self.blurs[i].1;
+        let second_moment = |q: f64| {
+            let taps = self.weights(reach, q);
+            taps.iter()
+                .zip(-reach..)
+                .map(|(w, x)| w * f64::from(x * x))
+                .sum::<f64>()
+        };
+        let (mut low, mut high) = (1e-2, 1e3);
+        for _ in 0..60 {
+            let middle = f64::sqrt(low * high);
+            if second_moment(middle) < variance {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    }
+
+    /// The taps of blur `i`, of `variance`, that an edge along an axis sees: summed over the other.
+    fn marginal(&self, i: usize, variance: f64) -> Vec<f64> {
+        self.weights(self.blurs[i].1, self.exponent(i, variance))
+    }
+
+    fn weights(&self, reach: i32, q: f64) -> Vec<f64> {
+        let weight = |x: i32, y: i32| {
+            let inside = !self.diamond || x.abs() + y.abs() <= reach;
+            if inside {
+                (-f64::from(x * x + y * y) / (2.0 * q)).exp()
+            } else {
+                0.0
+            }
+        };
+        let column = |x| (-reach..=reach).map(|y| weight(x, y)).sum();
+        let mut taps: Vec<f64> = (-reach..=reach).map(column).collect();
+        let mass: f64 = taps.iter().sum();
+        taps.iter_mut().for_each(|w| *w /= mass);
+        taps
+    }
+}
+
+/// How a profile is scattered at a stated error: the weights of the blurs at every scale.
+///
+/// It is made once for a set of profiles; fitting takes tenths of a second. Every blur is a
+/// Gaussian of a fixed width *in pixels*, those of a level twice as wide as those of the level
+/// before; what changes with the scale is how much of each is taken. The weights are fitted so that
+/// the largest error on straight edges is the least: edges soft by σ = 1 px against the closed form,
+/// hard ones against the visible integral.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    max_error: f32,
+    pub(crate) kernels: Kernels,
+    /// Levels above the frame.
+    pub(crate) levels: usize,
+    first_octave: f64,
+    /// A profile's rows, at scales a quarter of an octave apart.
+    profiles: Vec<Vec<Row>>,
+}
+
+/// What is done at one scale.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// Pixels per mm along the direction in which a surface is foreshortened most.
+    pub px_per_mm: f32,
+    /// Light that stays, then each blur of the frame, then each of level 1 and so on.
+    pub weights: Vec<Vec3>,
+    /// The largest error on straight edges, up to the next row; in units of `white`.
+    pub predicted_error: f32,
+}
+
+/// Rows to an octave of scale; between two of them weights are interpolated.
+pub(crate) const ROWS_PER_OCTAVE: f64 = 4.0;
+
+/// Levels that a plan may use: at the last, a pixel is 128 of the frame's.
+const MAX_LEVELS: usize = 7;
+
+impl Plan {
+    /// The cheapest plan whose error on flat edges is at most `max_error`, in units of the radiance
+    /// that the host shows as white; ids count `profiles` from 1.
+    ///
+    /// # Errors
+    /// No profile, or more than [`MAX_PROFILES`](crate::MAX_PROFILES); a `max_error` that is not a number above 0, or less
+    /// than the best plan has.
+    pub fn new(profiles: &[Profile], max_error: f32) -> Result<Self, Error> {
+        crate::input::check_profiles(profiles)?;
+        if !max_error.is_finite() || max_error <= 0.0 {
+            return Err(Error::new(
+                "max_error",
+                max_error.to_string(),
+                "a finite number above 0",
+            ));
+        }
+        let mut least = f32::INFINITY;
+        for kernels in KERNELS {
+            let plan = Self::of(profiles, max_error, kernels);
+            if plan.predicted_error() <= max_error {
+                return Ok(plan);
+            }
+            least = least.min(plan.predicted_error());
+        }
+        Err(Error::new(
+            "max_error",
+            max_error.to_string(),
+            format!("at least {least}; or the exact effect"),
+        ))
+    }
+
+    /// The plan of these kernels, whatever its error.
+    fn of(profiles: &[Profile], max_error: f32, kernels: Kernels) -> Self {
+        let responses = Responses::new(&kernels, MAX_LEVELS);
+        let widest = |p: &Profile| {
+            let variances = p.gaussians().iter().map(|g| f64::from(g.variance_mm2));
+            variances.fold(0.0, f64::max).sqrt()
+        };
+        let widest = profiles.iter().map(widest).fold(0.0, f64::max);
+        // From where the widest Gaussian is far below a pixel, to where the last level is as wide.
+        let (first, last) = if widest > 0.0 {
+            let last = f64::from(1 << MAX_LEVELS) / widest;
+            ((LEAST_PX / widest).log2(), last.log2())
+        } else {
+            (0.0, 0.0)
+        };
+        let rows = ((last - first) * ROWS_PER_OCTAVE).ceil() as usize + 2;
+        let fit = |profile: &Profile| {
+            let scale = |row: f64| f64::exp2(first + row / ROWS_PER_OCTAVE);
+            let mut fitted: Vec<Row> = (0..rows)
+                .map(|i| fit_row(&responses, &kernels, profile, scale(i as f64), max_error))
+                .collect();
+            for i in 0..rows - 1 {
+                let mean: Vec<Vec3> = fitted[i]
+                    .weights
+                    .iter()
+                    .zip(&fitted[i + 1].weights)
+                    .map(|(a, b)| (*a + *b) / 2.0)
+                    .collect();
+                let wanted = responses.wanted(profile, scale(i as f64 + 0.5));
+                let between = worst(&responses, &mean, &wanted);
+                let here = &mut fitted[i].predicted_error;
+                *here = here.max(between);
+            }
+            for i in 0..rows - 1 {
+                let next = fitted[i + 1].predicted_error;
+                fitted[i].predicted_error = fitted[i].predicted_error.max(next);
+            }
+            fitted
+        };
+        Self {
+            max_error,
+            kernels,
+            levels: MAX_LEVELS,
+            first_octave: first,
+            profiles: profiles.iter().map(fit).collect(),
+        }
+    }
+
+    /// log₂ of the pixels per mm of the first row.
+    pub(crate) fn first_octave(&self) -> f32 {
+        self.first_octave as f32
+    }
+
+    pub(crate) fn profile_count(&self) -> usize {
+        self.profiles.len()
+    }
+
+    pub(crate) fn row_count(&self) -> usize {
+        self.profiles[0].len()
+    }
+
+    /// Where blur `j` of level `l` is in a row of weights; the light that stays is at 0.
+    pub(crate) fn slot(&self, level: usize, j: usize) -> usize {
+        let Kernels { fine, coarse } = &self.kernels;
+        match level {
+            0 => 1 + j,
+            l => 1 + fine.blurs.len() + (l - 1) * coarse.blurs.len() + j,
+        }
+    }
+
+    /// Where the sum of the weights of all levels beyond `level` is.
+    pub(crate) fn rest_slot(&self, level: usize) -> usize {
+        self.slot(self.levels + 1, 0) + level
+    }
+
+    /// Vectors to a row of [`table`](Self::table).
+    pub(crate) fn stride(&self) -> usize {
+        self.rest_slot(self.levels) + 1
+    }
+
+    /// The weights as the shaders have them: of each profile the rows, of each row the slots, and in
+    /// the last component of its first one the highest level.
+    pub(crate) fn table(&self) -> Vec<Vec4> {
+        let mut table = Vec::new();
+        for row in self.profiles.iter().flatten() {
+            let levels = 0..=self.levels;
+            let beyond = |l: usize| row.weights[self.slot(l + 1, 0)..].iter().sum::<Vec3>();
+            let rest: Vec<Vec3> = levels.map(beyond).collect();
+            let top = rest.iter().take_while(|r| **r != Vec3::ZERO).count();
+            let weights = row.weights.iter().chain(&rest).map(|w| w.extend(0.0));
+            let first = table.len();
+            table.extend(weights);
+            table[first].w = top as f32;
+        }
+        table
+    }
+
+    /// The error that was asked for.
+    pub fn max_error(&self) -> f32 {
+        self.max_error
+    }
+
+    /// The largest error on flat edges, of any profile at any scale.
+    pub fn predicted_error(&self) -> f32 {
+        let rows = self.profiles.iter().flatten();
+        rows.map(|r| r.predicted_error).fold(0.0, f32::max)
+    }
+
+    /// The rows of a profile, counted from 0, from the smallest scale to the largest; none of one
+    /// that the plan was not made for.
+    pub fn rows(&self, profile: usize) -> &[Row] {
+        self.profiles.get(profile).map_or(&[], |rows| rows)
+    }
+}
+
+/// σ of the widest Gaussian, in pixels, below which a profile does nothing worth a row.
+const LEAST_PX: f64 = 0.0625;
+
+/// The weights at one scale, of as few blurs of the frame itself as the error allows.
+fn fit_row(
+    responses: &Responses,
+    kernels: &Kernels,
+    profile: &Profile,
+    px_per_mm: f64,
+    max_error: f32,
+) -> Row {
+    let wanted = responses.wanted(profile, px_per_mm);
+    let fine = kernels.fine.blurs.len();
+    let mut row = fit_columns(responses, &wanted, fine..fine, px_per_mm, max_error);
+    for used in 1..fine {
+        let fewer = fit_columns(responses, &wanted, used..fine, px_per_mm, max_error);
+        if fewer.predicted_error <= max_error.min(2.0 * row.predicted_error) {
+            row = fewer;
+            break;
+        }
+    }
+    row
+}
+
+/// The weights without some of the blurs of the frame itself.
+fn fit_columns(
+    responses: &Responses,
+    wanted: &[Vec<f64>; 3],
+    unused: std::ops::Range<usize>,
+    px_per_mm: f64,
+    max_error: f32,
+) -> Row {
+    let unused = unused.start + 1..unused.end + 1;
+    let columns: Vec<Vec<f64>> = responses
+        .columns
+        .iter()
+        .map(|row| {
+            let mut row = row.clone();
+            row.drain(unused.clone());
+            row
+        })
+        .collect();
+    let fits = wanted.each_ref().map(|wanted| {
+        let mut fit = nnls::minimax(&columns, wanted).0;
+        fit.splice(unused.start..unused.start, unused.clone().map(|_| 0.0));
+        fit
+    });
+    let mut weights: Vec<Vec3> = (0..fits[0].len())
+        .map(|i| DVec3::new(fits[0][i], fits[1][i], fits[2][i]).as_vec3())
+        .collect();
+    // What changes nothing is not worth its taps: its light goes to the next narrower blur.
+    for i in (1..weights.len()).rev() {
+        let too_small = weights[i].cmplt(Vec3::splat(0.05 * max_error));
+        let moved = Vec3::select(too_small, weights[i], Vec3::ZERO);
+        weights[i] -= moved;
+        let narrower = if unused.contains(&(i - 1)) {
+            unused.start - 1
+        } else {
+            i - 1
+        };
+        weights[narrower] += moved;
+    }
+    Row {
+        px_per_mm: px_per_mm as f32,
+        predicted_error: worst(responses, &weights, wanted),
+        weights,
+    }
+}
+
+fn worst(responses: &Responses, weights: &[Vec3], wanted: &[Vec<f64>; 3]) -> f32 {
+    let mut worst = 0.0;
+    for (i, columns) in responses.columns.iter().enumerate() {
+        let found: DVec3 = columns
+            .iter()
+            .zip(weights)
+            .map(|(c, w)| w.as_dvec3() * *c)
+            .sum();
+        let wanted = DVec3::new(wanted[0][i], wanted[1][i], wanted[2][i]);
+        worst = (found - wanted).abs().max_element().max(worst);
+    }
+    worst as f32
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        writeln!(
+            f,
+            "error {} asked for, {:.5} predicted",
+            self.max_error,
+            self.predicted_error()
+        )?;
+        for (what, taps) in [
+            ("the frame", self.kernels.fine),
+            ("each level", self.kernels.coarse),
+        ] {
+            write!(f, "{what}:")?;
+            for (variance, reach) in taps.blurs {
+                write!(f, " {variance} px² by taps to {reach} px")?;
+            }
+            writeln!(f, "{}", if taps.diamond { " in all" } else { "" })?;
+        }
+        for (rows, id) in self.profiles.iter().zip(1..) {
+            writeln!(f, "profile {id}:  px/mm   error    weights")?;
+            for row in rows {
+                write!(f, "  {:14.4}  {:.5} ", row.px_per_mm, row.predicted_error)?;
+                for w in &row.weights {
+                    let [r, g, b] = w.to_array().map(|c| (100.0 * c).round());
+                    write!(f, " {r:.0}/{g:.0}/{b:.0}")?;
+                }
+                writeln!(f)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plans_keep_what_they_state() {
+        for max_error in [1.0 / 100.0, 1.0 / 255.0] {
+            let since = std::time::Instant::now();
+            let plan = Plan::new(&[Profile::SKIN], max_error).unwrap();
+            println!("{plan}{:?}", since.elapsed());
+            assert!(plan.predicted_error() <= max_error);
+        }
+    }
+}

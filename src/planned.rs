@@ -1,0 +1,98 @@
+//! Scattering in screen space at a stated error.
+
+use glam::Vec4;
+use wgpu::{CommandEncoder, Device, Queue, TextureFormat};
+
+use crate::pyramid::{Inputs, Optics, Pyramid};
+use crate::screen_space::{check, inverse_mm};
+use crate::{Error, Plan, ScreenFrame};
+
+/// Scattering in screen space by a [`Plan`].
+pub struct PlannedScreenSpace {
+    output_format: TextureFormat,
+    pyramid: Pyramid,
+}
+
+impl PlannedScreenSpace {
+    /// The effect for outputs of `output_format`.
+    ///
+    /// # Errors
+    /// A format that cannot be rendered to on this device.
+    pub fn new(device: &Device, output_format: TextureFormat) -> Result<Self, Error> {
+        crate::input::check_output_format(device, output_format)?;
+        Ok(Self {
+            output_format,
+            pyramid: Pyramid::new(device, output_format),
+        })
+    }
+
+    /// Checks the inputs of a frame and uploads what the shaders need.
+    ///
+    /// # Errors
+    /// The first input that does not fit; the frame prepared before stays in place.
+    pub fn prepare(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        frame: &ScreenFrame,
+        plan: &Plan,
+    ) -> Result<(), Error> {
+        check(frame, self.output_format)?;
+        let optics = optics(frame)?;
+        self.pyramid.prepare(
+            device,
+            queue,
+            &Inputs {
+                irradiance: frame.irradiance,
+                depth: frame.depth,
+                profile_id: frame.profile_id,
+                output: frame.output,
+                optics,
+                plan,
+            },
+        );
+        Ok(())
+    }
+
+    /// Records the frame that was last prepared; nothing before the first.
+    pub fn render(&self, encoder: &mut CommandEncoder) {
+        self.pyramid.render(encoder);
+    }
+}
+
+/// With clip x = P₀₀·X + P₀₂·z + P₀₃ and clip w = P₃₂·z + P₃₃, all in units of the scene,
+/// X = (x′·w − P₀₂·z − P₀₃)/P₀₀ at the device coordinate x′, which is linear over the pixels.
+fn optics(frame: &ScreenFrame) -> Result<Optics, Error> {
+    let inverse = inverse_mm(frame.projection, frame.mm_per_unit)?;
+    let size = crate::input::size(frame.irradiance);
+    let [x, y, z, w] = [0, 1, 2, 3].map(|i| frame.projection.row(i));
+    if [z.x, z.y, w.x, w.y].iter().any(|c| *c != 0.0) {
+        return Err(Error::new(
+            "projection",
+            format!("{}", frame.projection),
+            "depth that does not depend on x and y",
+        ));
+    }
+    let mm = frame.mm_per_unit;
+    let at = |ndc: f32, row: Vec4, scale: f32| {
+        [
+            (ndc * w.z - row.z) / scale,
+            (ndc * w.w - row.w) / scale * mm,
+        ]
+    };
+    let step = |ndc: f32, scale: f32| [ndc * w.z / scale, ndc * w.w / scale * mm];
+    let [ux, vx] = at(-1.0, x, x.x);
+    let [uy, vy] = at(1.0, y, y.y);
+    let [dux, dvx] = step(2.0 / size[0] as f32, x.x);
+    let [duy, dvy] = step(-2.0 / size[1] as f32, y.y);
+    Ok(Optics {
+        origin: Vec4::new(ux, uy, vx, vy),
+        step: Vec4::new(dux, duy, dvx, dvy),
+        depth_to_mm: Vec4::new(
+            inverse.z_axis.z,
+            inverse.w_axis.z,
+            inverse.z_axis.w,
+            inverse.w_axis.w,
+        ),
+    })
+}

@@ -1,0 +1,154 @@
+//! Scattering by a plan against closed forms, and against what the plan states.
+
+mod common;
+
+use std::sync::OnceLock;
+
+use common::*;
+use glam::{DVec2, DVec3};
+use subsurface::truth::closed_form::{scattered_step, step};
+use subsurface::wgpu::TextureFormat;
+use subsurface::{Plan, PlannedScreenSpace, Profile, ScreenFrame};
+
+/// Plans of the skin profile at 1/100 and 1/255.
+fn plans() -> &'static [Plan; 2] {
+    static PLANS: OnceLock<[Plan; 2]> = OnceLock::new();
+    PLANS.get_or_init(|| {
+        [100.0, 255.0].map(|steps: f32| Plan::new(&[Profile::SKIN], steps.recip()).unwrap())
+    })
+}
+
+fn rgb(pixel: [f32; 4]) -> DVec3 {
+    DVec3::new(pixel[0].into(), pixel[1].into(), pixel[2].into())
+}
+
+/// The largest error on an edge at an angle that is soft by a pixel, away from the picture's border.
+fn edge_error(plan: &Plan, px_per_mm: f64, angle: f64) -> f64 {
+    // What the border cuts from a kernel is not the closed form's.
+    const REACH_MM: f64 = 9.6;
+    let view = View::orthographic([400, 400], px_per_mm);
+    let across = DVec3::new(angle.to_radians().cos(), angle.to_radians().sin(), 0.0);
+    let blur_mm2 = px_per_mm.powi(-2);
+    let g = view.shoot(plane(DVec3::Z, 300.0, |p| {
+        DVec3::splat(step(p.dot(across), blur_mm2))
+    }));
+    let out = g.scatter_planned(&[Profile::SKIN], plan);
+    let half = DVec2::splat(200.0 / px_per_mm - REACH_MM);
+    let inside = g.pixels(|h| h.point.truncate().abs().cmplt(half).all());
+    let errors = inside.iter().map(|(i, hit)| {
+        let truth = scattered_step(hit.point.dot(across), blur_mm2, &Profile::SKIN);
+        (rgb(out[*i]) - truth).abs().max_element()
+    });
+    errors.fold(0.0, f64::max)
+}
+
+#[test]
+fn soft_edges_keep_the_error_that_was_asked_for() {
+    for plan in plans() {
+        for px_per_mm in [0.5, 1.0, 2.0, 4.0, 12.0] {
+            for angle in [0.0, 27.0, 45.0, 90.0] {
+                let error = edge_error(plan, px_per_mm, angle);
+                let max_error = f64::from(plan.max_error());
+                println!("{max_error:.5} asked, {px_per_mm} px/mm, {angle}°: {error:.5}");
+                assert!(error <= max_error, "{px_per_mm} px/mm, {angle}°: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn constant_light_stays_constant() {
+    // A sphere over a sloping plane, with holes, in a wide perspective.
+    let e = DVec3::new(0.8, 0.5, 0.3);
+    let near = sphere(12.0, 60.0, |_| e);
+    let far = plane(tilted_normal(50.0, 30.0), 75.0, |_| e);
+    let g = View::perspective([320, 256], 60.0).shoot(|origin, ray| {
+        let hit = near(origin, ray).or_else(|| far(origin, ray))?;
+        let holes = (7.0 * hit.point.x).sin() * (5.0 * hit.point.y).sin() > 0.6;
+        (!holes).then_some(hit)
+    });
+    for plan in plans() {
+        let out = g.scatter_planned(&[Profile::SKIN], plan);
+        for (i, _) in g.pixels(|_| true) {
+            // A few half floats of rounding, each 2⁻¹² of the value.
+            let error = (rgb(out[i]) - e).abs().max_element();
+            assert!(error <= 0.001, "pixel {i}: {error}");
+        }
+    }
+}
+
+#[test]
+fn other_pixels_stay_bit_for_bit() {
+    let ball = sphere(9.0, 60.0, |n| DVec3::splat(n.x.max(0.0)));
+    for g in [
+        View::perspective([201, 97], 40.0).shoot(&ball),
+        // Nothing at all.
+        View::perspective([64, 33], 40.0).shoot(|_, _| None),
+    ] {
+        let out = g.scatter_planned(&[Profile::SKIN], &plans()[1]);
+        for (pixel, hit) in out.iter().zip(&g.hits) {
+            if hit.is_none() {
+                assert_eq!(*pixel, [0.25, 0.25, 0.25, 0.5]);
+            }
+        }
+    }
+}
+
+#[test]
+fn no_scattering_leaks_onto_another_profile() {
+    // Two halves of one plane, the left of profile 1 and lit.
+    let g = View::orthographic([160, 96], 4.0).shoot(|origin, _| {
+        let left = origin.x < 0.0;
+        Some(Hit {
+            point: origin.truncate().extend(-300.0),
+            normal: DVec3::Z,
+            irradiance: DVec3::splat(f64::from(u8::from(left))),
+            id: if left { 1 } else { 2 },
+        })
+    });
+    let profiles = [Profile::SKIN; 2];
+    let plan = Plan::new(&profiles, 0.01).unwrap();
+    let out = g.scatter_planned(&profiles, &plan);
+    for (i, hit) in g.pixels(|_| true) {
+        assert!(
+            (rgb(out[i]) - hit.irradiance).abs().max_element() < 0.001,
+            "pixel {i}"
+        );
+    }
+}
+
+#[test]
+fn frames_of_every_size_are_scattered() {
+    let mut effect = PlannedScreenSpace::new(&gpu().device, TextureFormat::Rgba16Float).unwrap();
+    for size in [[1, 1], [1, 70], [333, 2], [17, 16]] {
+        let gpu = gpu();
+        let count = (size[0] * size[1]) as usize;
+        let output = gpu.target("output", size, TextureFormat::Rgba16Float);
+        let light = vec![[1.0f32, 0.5, 0.25, 1.0]; count];
+        let frame = ScreenFrame {
+            irradiance: &gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &light),
+            depth: &gpu.upload("depth", size, TextureFormat::R32Float, &vec![0.5f32; count]),
+            profile_id: &gpu.upload("id", size, TextureFormat::R8Uint, &vec![1u8; count]),
+            output: &output,
+            projection: View::orthographic(size, 4.0).projection.as_mat4(),
+            mm_per_unit: 1.0,
+            profiles: &[Profile::SKIN],
+        };
+        effect
+            .prepare(&gpu.device, &gpu.queue, &frame, &plans()[1])
+            .unwrap();
+        gpu.run(|encoder| effect.render(encoder));
+        for pixel in gpu.read(&output) {
+            assert!((pixel[1] - 0.5).abs() < 0.001, "{size:?}: {pixel:?}");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_kept_is_refused() {
+    for bad in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-4] {
+        let error = Plan::new(&[Profile::SKIN], bad).unwrap_err();
+        assert_eq!(error.input, "max_error");
+    }
+    assert_eq!(Plan::new(&[], 0.01).unwrap_err().input, "profiles");
+}
