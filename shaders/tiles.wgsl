@@ -30,7 +30,7 @@ const ROWS_PER_OCTAVE = 4.0;
 var<workgroup> top: atomic<u32>;
 
 // One workgroup a tile.
-@compute @workgroup_size(16, 16)
+@compute @workgroup_size(TILE, TILE)
 fn mark(
     @builtin(global_invocation_id) at: vec3u,
     @builtin(local_invocation_index) local: u32,

@@ -771,6 +771,15 @@ mod tests {
     const TILES: &str = include_str!("../shaders/tiles.wgsl");
 
     #[test]
+    fn constants_are_those_of_the_shaders() {
+        for shader in [PYRAMID, TILES] {
+            assert!(shader.contains(&format!("const TILE = {TILE}u;")));
+            let rows = crate::plan::ROWS_PER_OCTAVE;
+            assert!(shader.contains(&format!("const ROWS_PER_OCTAVE = {rows:.1};")));
+        }
+    }
+
+    #[test]
     fn structs_lie_as_the_shaders_have_them() {
         assert_layout!(
             PYRAMID,

@@ -151,4 +151,12 @@ fn what_cannot_be_kept_is_refused() {
         assert_eq!(error.input, "max_error");
     }
     assert_eq!(Plan::new(&[], 0.01).unwrap_err().input, "profiles");
+    let g = View::orthographic([8, 8], 4.0).shoot(|_, _| None);
+    let two = [Profile::SKIN; 2];
+    g.render(&two, TextureFormat::Rgba16Float, |frame, _| {
+        let format = TextureFormat::Rgba16Float;
+        let mut effect = PlannedScreenSpace::new(&gpu().device, format).unwrap();
+        let error = effect.prepare(&gpu().device, &gpu().queue, frame, &plans()[0]);
+        assert_eq!(error.unwrap_err().input, "plan");
+    });
 }

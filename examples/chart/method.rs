@@ -79,12 +79,13 @@ impl ScreenMethod for Planned {
         self.effect.render(encoder);
     }
 
+    /// Each pixel has its own, by its scale and slope.
     fn fetches(&self, _px_per_mm: f64) -> Option<f64> {
         None
     }
 
     fn scratch_bytes_per_pixel(&self) -> f64 {
-        24.0
+        24.1
     }
 }
 

@@ -168,7 +168,7 @@ impl GBuffer {
     }
 
     /// What an effect makes of the frame.
-    fn render(
+    pub fn render(
         &self,
         profiles: &[Profile],
         format: TextureFormat,
