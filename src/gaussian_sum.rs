@@ -182,7 +182,7 @@ impl GaussianSum {
 
 impl Scratch {
     fn new(device: &Device, size: [u32; 2], label: &str) -> Self {
-        let view = |name: &str| scratch_view(device, &format!("{label} {name}"), size);
+        let view = |name: &str| scratch_view(device, &format!("{label} {name}"), size, SCRATCH);
         Self {
             size,
             source: view("source"),
@@ -201,8 +201,13 @@ pub(crate) fn uniform<T: Pod>(device: &Device, label: &str, contents: &T) -> wgp
     })
 }
 
-/// A full-float texture that passes hand to each other.
-pub(crate) fn scratch_view(device: &Device, label: &str, size: [u32; 2]) -> TextureView {
+/// A texture that passes hand to each other.
+pub(crate) fn scratch_view(
+    device: &Device,
+    label: &str,
+    size: [u32; 2],
+    format: TextureFormat,
+) -> TextureView {
     device
         .create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
@@ -214,7 +219,7 @@ pub(crate) fn scratch_view(device: &Device, label: &str, size: [u32; 2]) -> Text
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
-            format: SCRATCH,
+            format,
             usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
             view_formats: &[],
         })

@@ -9,6 +9,7 @@ use wgpu::{
     TextureView,
 };
 
+use crate::gaussian_sum::scratch_view;
 use crate::plan::{Plan, own_blur};
 
 /// Side of a tile, in pixels of its level.
@@ -421,8 +422,8 @@ impl Scratch {
                     tiles,
                     gathering: uniform("subsurface tiles of a level", size_of::<Gathering>()),
                     settings: uniform("subsurface level", size_of::<Level>()),
-                    packed: texture(device, "subsurface surface", size, PACKED),
-                    sum: (l > 0).then(|| texture(device, "subsurface sum", size, SUM)),
+                    packed: scratch_view(device, "subsurface surface", size, PACKED),
+                    sum: (l > 0).then(|| scratch_view(device, "subsurface sum", size, SUM)),
                     tops: buffer("subsurface tops", count, BufferUsages::STORAGE),
                     list: buffer("subsurface tiles", count, BufferUsages::STORAGE),
                     draw: buffer(
@@ -486,25 +487,6 @@ fn level_settings(plan: &Plan, l: usize, levels: usize, size: [u32; 2]) -> Level
     }
 }
 
-fn texture(device: &Device, label: &str, size: [u32; 2], format: TextureFormat) -> TextureView {
-    device
-        .create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d {
-                width: size[0],
-                height: size[1],
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        })
-        .create_view(&Default::default())
-}
-
 fn storage(device: &Device, label: &str, contents: &[u8]) -> Buffer {
     use wgpu::util::DeviceExt;
     device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -545,7 +527,7 @@ impl Frame {
             let sum = levels.get(l + 1).and_then(|n| n.sum.as_ref());
             (&next.packed, sum)
         };
-        let none = texture(device, "subsurface nothing", [1, 1], SUM);
+        let none = scratch_view(device, "subsurface nothing", [1, 1], SUM);
         let level_entries = |l: usize| {
             let level = &levels[l];
             let (packed, sum) = coarser(l);

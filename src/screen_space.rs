@@ -114,7 +114,12 @@ impl ScreenSpace {
         );
         let positions = match self.positions.take() {
             Some(view) if input::size(&view) == size => view,
-            _ => gaussian_sum::scratch_view(device, "subsurface::ScreenSpace positions", size),
+            _ => gaussian_sum::scratch_view(
+                device,
+                "subsurface::ScreenSpace positions",
+                size,
+                gaussian_sum::SCRATCH,
+            ),
         };
         self.group = Some(device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("subsurface::ScreenSpace positions"),
