@@ -128,7 +128,7 @@ impl Plan {
                 size: size(256),
                 rounds: Rounds {
                     all: 3,
-                    compared: 5,
+                    compared: 3,
                     seconds: 2.0,
                 },
                 stride: 4,
