@@ -58,7 +58,7 @@ struct Level {
 @group(0) @binding(7) var here_packed: texture_2d<u32>;
 @group(0) @binding(8) var finer_packed: texture_2d<u32>;
 @group(0) @binding(9) var coarser_packed: texture_2d<u32>;
-// What the coarser levels sum up to.
+// The mean of the coarser levels.
 @group(0) @binding(10) var coarser_sum: texture_2d<u32>;
 
 // Blurs to a level, and whether their taps are those of |x| + |y| ≤ reach.
@@ -211,6 +211,10 @@ fn fs_pack(@builtin(position) at: vec4f) -> @location(0) vec4u {
     }
     let last = vec2i(textureDimensions(depth)) - 1;
     let z = z_at(pixel);
+    // Infinitely far away there is no surface.
+    if !(abs(z) < 3e38) {
+        return vec4u(0u);
+    }
     let left = z_at(vec2i(max(pixel.x - 1, 0), pixel.y));
     let right = z_at(vec2i(min(pixel.x + 1, last.x), pixel.y));
     let above = z_at(vec2i(pixel.x, max(pixel.y - 1, 0)));
@@ -224,7 +228,8 @@ fn fs_pack(@builtin(position) at: vec4f) -> @location(0) vec4u {
     let t = vec2f(tangent(east, west, mm.x), tangent(south, north, mm.y));
     let plane = plane_of(pixel, z, t);
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
-    let light = textureLoad(irradiance, pixel, 0).rgb;
+    // What is packed is half floats, which end there.
+    let light = min(textureLoad(irradiance, pixel, 0).rgb, vec3f(65504.0));
     return pack(Surface(light, area, z, sine_of(t), id));
 }
 
@@ -311,13 +316,12 @@ fn weight_at(scale: Scale, slot: u32) -> vec3f {
     return mix(weights[i].rgb, weights[i + view.stride].rgb, scale.next);
 }
 
-// The sum of the coarser levels at a pixel of this one, between their four pixels around it, of its
+// The mean of the coarser levels at a pixel of this one, between their four pixels around it, of its
 // own surface only; a < 0 where none of them is.
 fn coarser_at(pixel: vec2i, plane: Plane, id: u32) -> vec4f {
     let last = vec2i(textureDimensions(coarser_sum)) - 1;
     let odd = pixel & vec2i(1);
     let near = pixel >> vec2u(1u);
-    let mm = mm_per_px(plane.p.z);
     let tolerance = 2.0 * TOLERANCE * max(length(plane.dx), length(plane.dy));
     // At the border of the frame, where the light of two pixels goes on as between them.
     var side = 2 * odd - 1;
@@ -348,7 +352,7 @@ fn coarser_at(pixel: vec2i, plane: Plane, id: u32) -> vec4f {
 struct Gathered {
     light: vec3f,
     weight: vec3f,
-    // Unweighted, of this level's widest blur; or what the pixel has, where none is asked for.
+    // The mean of this level's blurs; or what the pixel has, where none is asked for.
     own: vec3f,
 }
 

@@ -1,15 +1,13 @@
 // Which tiles hold skin, and up to which level of the pyramid each needs the light: what lets all
 // other passes run there alone.
 
-struct Settings {
-    // z = (x·depth + y)/(z·depth + w), in mm.
+// As in pyramid.wgsl.
+struct View {
+    origin: vec4f,
+    step: vec4f,
     depth_to_mm: vec4f,
-    // The mm between pixels of a surface that faces the camera: |x + y·z| along a row, |z + w·z|
-    // along a column.
-    spacing: vec4f,
     first_octave: f32,
     rows: u32,
-    // Vectors of weights to a row.
     stride: u32,
     profiles: u32,
 }
@@ -17,7 +15,7 @@ struct Settings {
 // Side of a tile in pixels of its level.
 const TILE = 16u;
 
-@group(0) @binding(0) var<uniform> settings: Settings;
+@group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var depth: texture_2d<f32>;
 @group(0) @binding(2) var profile_id: texture_2d<u32>;
 // The weights of the plan; the first vector of a row has the highest level in w.
@@ -41,15 +39,15 @@ fn mark(
     var here = 0u;
     if all(at.xy < size) {
         let id = textureLoad(profile_id, at.xy, 0).r;
-        if id > 0u && id <= settings.profiles {
+        if id > 0u && id <= view.profiles {
             let d = textureLoad(depth, at.xy, 0).r;
-            let z = (settings.depth_to_mm.x * d + settings.depth_to_mm.y)
-                / (settings.depth_to_mm.z * d + settings.depth_to_mm.w);
-            let mm = abs(settings.spacing.xz + settings.spacing.yw * z);
+            let z = (view.depth_to_mm.x * d + view.depth_to_mm.y)
+                / (view.depth_to_mm.z * d + view.depth_to_mm.w);
+            let mm = abs(view.step.xy * z + view.step.zw);
             // A slope is blurred at finer levels than a surface that faces the camera.
-            let row = ceil((-log2(max(mm.x, mm.y)) - settings.first_octave) * ROWS_PER_OCTAVE);
-            let i = u32(clamp(row, 0.0, f32(settings.rows - 1u)));
-            here = 1u + u32(weights[((id - 1u) * settings.rows + i) * settings.stride].w);
+            let row = ceil((-log2(max(mm.x, mm.y)) - view.first_octave) * ROWS_PER_OCTAVE);
+            let i = u32(clamp(row, 0.0, f32(view.rows - 1u)));
+            here = 1u + u32(weights[((id - 1u) * view.rows + i) * view.stride].w);
         }
     }
     if local == 0u {

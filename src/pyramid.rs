@@ -18,7 +18,7 @@ const TILE: u32 = 16;
 const PACKED: TextureFormat = TextureFormat::Rgba32Uint;
 const SUM: TextureFormat = TextureFormat::Rg32Uint;
 
-/// `View` of pyramid.wgsl.
+/// `View` of both shaders.
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct View {
@@ -52,18 +52,6 @@ struct Level {
     rest: u32,
     coarser: u32,
     pad: [u32; 3],
-}
-
-/// `Settings` of tiles.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Marking {
-    depth_to_mm: Vec4,
-    spacing: Vec4,
-    first_octave: f32,
-    rows: u32,
-    stride: u32,
-    profiles: u32,
 }
 
 /// `Level` of tiles.wgsl.
@@ -123,7 +111,6 @@ struct Planned {
 struct Scratch {
     size: [u32; 2],
     view: Buffer,
-    marking: Buffer,
     tops: Buffer,
     levels: Vec<LevelScratch>,
 }
@@ -201,15 +188,6 @@ impl Pyramid {
             profiles: plan.profile_count() as u32,
         };
         queue.write_buffer(&scratch.view, 0, bytemuck::bytes_of(&view));
-        let marking = Marking {
-            depth_to_mm: optics.depth_to_mm,
-            spacing: Vec4::new(optics.step.z, optics.step.x, optics.step.w, optics.step.y),
-            first_octave: view.first_octave,
-            rows: view.rows,
-            stride: view.stride,
-            profiles: view.profiles,
-        };
-        queue.write_buffer(&scratch.marking, 0, bytemuck::bytes_of(&marking));
         let views = [
             inputs.irradiance,
             inputs.depth,
@@ -452,7 +430,6 @@ impl Scratch {
         Self {
             size,
             view: uniform("subsurface view", size_of::<View>()),
-            marking: uniform("subsurface marking", size_of::<Marking>()),
             tops: buffer("subsurface tops", tiles_of_frame, BufferUsages::STORAGE),
             levels,
         }
@@ -576,7 +553,7 @@ impl Frame {
             mark: group(
                 &planned.mark.layout,
                 &[
-                    (0, scratch.marking.as_entire_binding()),
+                    (0, scratch.view.as_entire_binding()),
                     (1, Texture(depth)),
                     (2, Texture(profile_id)),
                     (3, planned.weights.as_entire_binding()),
@@ -798,17 +775,9 @@ mod tests {
                 coarser
             }
         );
-        assert_layout!(
-            TILES,
-            "Settings",
-            Marking {
-                depth_to_mm,
-                spacing,
-                first_octave,
-                rows,
-                stride,
-                profiles
-            }
+        assert_eq!(
+            crate::wgsl::layout(TILES, "View"),
+            crate::wgsl::layout(PYRAMID, "View")
         );
         assert_layout!(
             TILES,

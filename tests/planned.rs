@@ -57,6 +57,37 @@ fn soft_edges_keep_the_error_that_was_asked_for() {
 }
 
 #[test]
+fn hard_edges_along_an_axis_keep_it_too() {
+    let plan = &plans()[1];
+    for px_per_mm in [1.5, 4.0, 8.0] {
+        for across in [DVec3::X, DVec3::Y] {
+            let g = View::orthographic([300, 300], px_per_mm).shoot(plane(DVec3::Z, 300.0, |p| {
+                DVec3::splat(step(p.dot(across), 0.0))
+            }));
+            let out = g.scatter_planned(&[Profile::SKIN], plan);
+            let out: Vec<DVec3> = out.into_iter().map(rgb).collect();
+            // Across the middle of the edge, far from the picture's border.
+            let along = DVec3::new(across.y, across.x, 0.0);
+            let near = |h: &Hit| {
+                h.point.dot(along).abs() < 1.0 / px_per_mm
+                    && h.point.dot(across).abs() < 8.0 / px_per_mm
+            };
+            let pixels: Vec<usize> = g.pixels(near).iter().map(|(i, _)| *i).collect();
+            let errors = g.errors(&out, &pixels);
+            let error = errors
+                .iter()
+                .map(|e| e.abs().max_element())
+                .fold(0.0, f64::max);
+            println!("{px_per_mm} px/mm, across {across}: {error:.5}");
+            assert!(
+                error <= f64::from(plan.max_error()),
+                "{px_per_mm} px/mm: {error}"
+            );
+        }
+    }
+}
+
+#[test]
 fn constant_light_stays_constant() {
     // A sphere over a sloping plane, with holes, in a wide perspective.
     let e = DVec3::new(0.8, 0.5, 0.3);

@@ -106,11 +106,13 @@ impl Taps {
 
 /// How a profile is scattered at a stated error: the weights of the blurs at every scale.
 ///
-/// It is made once for a set of profiles; fitting takes tenths of a second. Every blur is a
+/// It is made once for a set of profiles, not for each frame: fitting a profile takes a second, or
+/// several where `max_error` is small. Every blur is a
 /// Gaussian of a fixed width *in pixels*, those of a level twice as wide as those of the level
 /// before; what changes with the scale is how much of each is taken. The weights are fitted so that
 /// the largest error on straight edges is the least: edges soft by σ = 1 px against the closed form,
-/// hard ones against the visible integral.
+/// hard ones along an axis of the pixels against the visible integral. Hard ones at other angles, layers
+/// and detail of a pixel on steep slopes may be off by more (docs/method.md).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     max_error: f32,
@@ -144,8 +146,8 @@ impl Plan {
     /// that the host shows as white; ids count `profiles` from 1.
     ///
     /// # Errors
-    /// No profile, or more than [`MAX_PROFILES`](crate::MAX_PROFILES); a `max_error` that is not a number above 0, or less
-    /// than the best plan has.
+    /// No profile, or more than [`MAX_PROFILES`](crate::MAX_PROFILES); a `max_error` that is not a
+    /// number above 0, or less than the best plan has.
     pub fn new(profiles: &[Profile], max_error: f32) -> Result<Self, Error> {
         crate::input::check_profiles(profiles)?;
         if !max_error.is_finite() || max_error <= 0.0 {
@@ -412,6 +414,28 @@ mod tests {
             let plan = Plan::new(&[Profile::SKIN], max_error).unwrap();
             println!("{plan}{:?}", since.elapsed());
             assert!(plan.predicted_error() <= max_error);
+        }
+    }
+
+    #[test]
+    fn profiles_of_any_width_have_a_plan() {
+        let of = |variance_mm2| crate::Gaussian {
+            variance_mm2,
+            weight: Vec3::ONE,
+        };
+        for gaussians in [
+            vec![of(0.0)],
+            vec![of(1e-12)],
+            vec![of(1e6)],
+            vec![of(1e-12), of(1.0), of(1e6)],
+        ] {
+            let profile = Profile::new(&gaussians).unwrap();
+            let plan = Plan::new(&[profile], 0.1).unwrap();
+            for row in plan.rows(0) {
+                // Light that is moved between blurs is neither made nor lost.
+                let sum: Vec3 = row.weights.iter().sum();
+                assert!((sum - 1.0).abs().max_element() < 1e-5, "{sum}");
+            }
         }
     }
 }
