@@ -1,7 +1,7 @@
-// Which tiles hold skin, and up to which level of the pyramid each needs the light: what lets all
-// other passes run there alone.
+// Which tiles hold skin, up to which level of the pyramid each needs the light, and which of them are
+// simple: what lets all other passes run there alone, and as cheaply as they can.
 
-// As in pyramid.wgsl.
+// As in surface.wgsl.
 struct View {
     origin: vec4f,
     step: vec4f,
@@ -14,50 +14,78 @@ struct View {
 
 // Side of a tile in pixels of its level.
 const TILE = 16u;
+// Pixels that taps reach on flat tiles.
+const RING = 4u;
+// Levels that may have flat tiles.
+const FLAT_LEVELS = 3u;
+const ROWS_PER_OCTAVE = 6.0;
+
+// What is known of a tile: 1 + the highest level it needs, or 0 without skin; its profile; and where
+// it holds anything else: at all, or in the RING pixels at a side.
+const TOP = 0xfu;
+const ELSE_ANY = 0x10u;
+const ELSE_LEFT = 0x20u;
+const ELSE_RIGHT = 0x40u;
+const ELSE_ABOVE = 0x80u;
+const ELSE_BELOW = 0x100u;
+const ELSE_ALL = 0x1f0u;
+const ID_SHIFT = 16u;
+const NO_SKIN = ELSE_ALL;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var depth: texture_2d<f32>;
 @group(0) @binding(2) var profile_id: texture_2d<u32>;
 // The weights of the plan; the first vector of a row has the highest level in w.
 @group(0) @binding(3) var<storage, read> weights: array<vec4f>;
-// Of each tile: 0 without skin, else 1 + the highest level.
-@group(0) @binding(4) var<storage, read_write> tops: array<u32>;
-
-const ROWS_PER_OCTAVE = 4.0;
+@group(0) @binding(4) var<storage, read_write> marked: array<u32>;
 
 var<workgroup> top: atomic<u32>;
+var<workgroup> largest_id: atomic<u32>;
+var<workgroup> elsewhere: atomic<u32>;
 
 // One workgroup a tile.
 @compute @workgroup_size(TILE, TILE)
 fn mark(
     @builtin(global_invocation_id) at: vec3u,
+    @builtin(local_invocation_id) inside: vec3u,
     @builtin(local_invocation_index) local: u32,
     @builtin(workgroup_id) tile: vec3u,
     @builtin(num_workgroups) tiles: vec3u,
 ) {
-    let size = textureDimensions(profile_id);
-    var here = 0u;
-    if all(at.xy < size) {
-        let id = textureLoad(profile_id, at.xy, 0).r;
-        if id > 0u && id <= view.profiles {
-            let d = textureLoad(depth, at.xy, 0).r;
-            let z = (view.depth_to_mm.x * d + view.depth_to_mm.y)
-                / (view.depth_to_mm.z * d + view.depth_to_mm.w);
+    var id = 0u;
+    if all(at.xy < textureDimensions(profile_id)) {
+        id = textureLoad(profile_id, at.xy, 0).r;
+        if id > view.profiles {
+            id = 0u;
+        }
+    }
+    if id > 0u {
+        let d = textureLoad(depth, at.xy, 0).r;
+        let z = (view.depth_to_mm.x * d + view.depth_to_mm.y)
+            / (view.depth_to_mm.z * d + view.depth_to_mm.w);
+        // Infinitely far away there is no surface.
+        if !(abs(z) < 3e38) {
+            id = 0u;
+        } else {
             let mm = abs(view.step.xy * z + view.step.zw);
             // A slope is blurred at finer levels than a surface that faces the camera.
             let row = ceil((-log2(max(mm.x, mm.y)) - view.first_octave) * ROWS_PER_OCTAVE);
             let i = u32(clamp(row, 0.0, f32(view.rows - 1u)));
-            here = 1u + u32(weights[((id - 1u) * view.rows + i) * view.stride].w);
+            atomicMax(&top, 1u + u32(weights[((id - 1u) * view.rows + i) * view.stride].w));
+            atomicMax(&largest_id, id);
         }
     }
-    if local == 0u {
-        atomicStore(&top, 0u);
+    workgroupBarrier();
+    let of_tile = atomicLoad(&largest_id);
+    if of_tile > 0u && id != of_tile {
+        let sides = vec4<bool>((inside.xy < vec2u(RING)), (inside.xy >= vec2u(TILE - RING)));
+        let bits = select(vec4u(0u), vec4u(ELSE_LEFT, ELSE_ABOVE, ELSE_RIGHT, ELSE_BELOW), sides);
+        atomicOr(&elsewhere, ELSE_ANY | bits.x | bits.y | bits.z | bits.w);
     }
     workgroupBarrier();
-    atomicMax(&top, here);
-    workgroupBarrier();
     if local == 0u {
-        tops[tile.y * tiles.x + tile.x] = atomicLoad(&top);
+        let skin = of_tile << ID_SHIFT | atomicLoad(&elsewhere) | atomicLoad(&top);
+        marked[tile.y * tiles.x + tile.x] = select(NO_SKIN, skin, of_tile > 0u);
     }
 }
 
@@ -76,28 +104,58 @@ struct Draw {
 }
 
 @group(0) @binding(5) var<uniform> level: Level;
-@group(0) @binding(6) var<storage, read> tops_below: array<u32>;
-@group(0) @binding(7) var<storage, read_write> tops_here: array<u32>;
-@group(0) @binding(8) var<storage, read_write> draw: Draw;
-// Tiles to be drawn, x in the low half.
+@group(0) @binding(6) var<storage, read> below: array<u32>;
+@group(0) @binding(7) var<storage, read_write> here: array<u32>;
+// Of the tiles that are simple, and of the others.
+@group(0) @binding(8) var<storage, read_write> draws: array<Draw, 2>;
+// Tiles to be drawn, x in the low half: the simple ones from the front on, the others from the end.
 @group(0) @binding(9) var<storage, read_write> list: array<u32>;
+// Of each tile of this level and of the one below, a bit for each level at which it is bent.
+@group(0) @binding(10) var<storage, read> bends_below: array<u32>;
+@group(0) @binding(11) var<storage, read_write> bends: array<u32>;
 
-fn top_of(tile: vec2i) -> u32 {
-    let last = vec2i(level.below) - 1;
+struct Tile {
+    marks: u32,
+    bends: u32,
+}
+
+fn tile_below(tile: vec2i) -> Tile {
+    if any(tile < vec2i(0)) || any(tile >= vec2i(level.below)) {
+        return Tile(NO_SKIN, 0u);
+    }
+    let i = u32(tile.y) * level.below.x + u32(tile.x);
+    return Tile(below[i], bends_below[i]);
+}
+
+// A tile of this level: as it was marked, or what its four children are together.
+fn tile_at(tile: vec2i) -> Tile {
     if level.level == 0u {
-        if any(tile < vec2i(0)) || any(tile > last) {
-            return 0u;
-        }
-        return tops_below[u32(tile.y) * level.below.x + u32(tile.x)];
+        return tile_below(tile);
     }
-    var top = 0u;
+    var all = Tile(0u, 0u);
+    var highest = 0u;
+    var id = 0u;
     for (var i = 0; i < 4; i++) {
-        let child = 2 * tile + vec2i(i & 1, i >> 1u);
-        if all(child >= vec2i(0)) && all(child <= last) {
-            top = max(top, tops_below[u32(child.y) * level.below.x + u32(child.x)]);
+        let side = vec2i(i & 1, i >> 1u);
+        let child = tile_below(2 * tile + side);
+        all.bends |= child.bends;
+        highest = max(highest, child.marks & TOP);
+        if (child.marks & ELSE_ANY) != 0u {
+            all.marks |= ELSE_ANY
+                | select(ELSE_LEFT, ELSE_RIGHT, side.x == 1)
+                | select(ELSE_ABOVE, ELSE_BELOW, side.y == 1);
         }
+        let child_id = child.marks >> ID_SHIFT;
+        if child_id != 0u && id != 0u && child_id != id {
+            all.marks |= ELSE_ALL;
+        }
+        id = max(id, child_id);
     }
-    return top;
+    all.marks |= id << ID_SHIFT | highest;
+    if id == 0u {
+        all.marks = NO_SKIN;
+    }
+    return all;
 }
 
 // One thread a tile: lists those that need this level, and their neighbours, which kernels reach.
@@ -106,15 +164,33 @@ fn gather(@builtin(global_invocation_id) at: vec3u) {
     if any(at.xy >= level.tiles) {
         return;
     }
-    let tile = vec2i(at.xy);
-    tops_here[at.y * level.tiles.x + at.x] = top_of(tile);
+    let middle = tile_at(vec2i(at.xy));
+    var bent = middle.bends;
+    var simple = level.level < FLAT_LEVELS && (middle.marks & ELSE_ANY) == 0u;
     var top = 0u;
     for (var y = -1; y <= 1; y++) {
         for (var x = -1; x <= 1; x++) {
-            top = max(top, top_of(tile + vec2i(x, y)));
+            let tile = tile_at(vec2i(at.xy) + vec2i(x, y));
+            top = max(top, tile.marks & TOP);
+            // The sides that face the tile in the middle.
+            let facing = select(0u, ELSE_RIGHT, x < 0) | select(0u, ELSE_LEFT, x > 0)
+                | select(0u, ELSE_BELOW, y < 0) | select(0u, ELSE_ABOVE, y > 0);
+            let torn = (tile.marks & facing) == facing && facing != 0u;
+            simple &= !torn && tile.marks >> ID_SHIFT == middle.marks >> ID_SHIFT;
+            // Pixels of the frame itself have told the tiles around them.
+            bent |= select(tile.bends, 0u, level.level == 0u);
         }
     }
-    if top > level.level {
-        list[atomicAdd(&draw.instances, 1u)] = at.y << 16u | at.x;
+    let i = at.y * level.tiles.x + at.x;
+    here[i] = middle.marks;
+    bends[i] = middle.bends;
+    if top <= level.level {
+        return;
+    }
+    let tile = at.y << 16u | at.x;
+    if simple && (bent >> level.level & 1u) == 0u {
+        list[atomicAdd(&draws[0].instances, 1u)] = tile;
+    } else {
+        list[arrayLength(&list) - 1u - atomicAdd(&draws[1].instances, 1u)] = tile;
     }
 }

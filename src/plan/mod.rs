@@ -1,5 +1,6 @@
 //! The plan: how much of which blur makes a profile, at every scale, to a stated error.
 
+mod kernels;
 mod nnls;
 mod response;
 
@@ -8,101 +9,8 @@ use std::fmt;
 use glam::{DVec3, Vec3, Vec4};
 
 use crate::{Error, Profile};
+pub(crate) use kernels::{KERNELS, Kernels, Kinds, Shape, own_blur};
 use response::Responses;
-
-/// Blurs of one resolution: Gaussians, each cut off by a shape of taps.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Taps {
-    /// Variances in square pixels of their level, and how many pixels their taps reach along an
-    /// axis; from the narrowest on.
-    pub blurs: &'static [(f64, i32)],
-    /// Whether the taps are those of |x| + |y| ≤ reach, not of the whole square.
-    pub diamond: bool,
-}
-
-/// The blurs that a plan is made of: `fine` ones of the frame itself, of which each scale uses the
-/// first few, and `coarse` ones of each level, whose variances hold what the pyramid blurs by itself.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Kernels {
-    pub fine: Taps,
-    pub coarse: Taps,
-}
-
-/// From the cheapest to the most exact. Levels double, so variances of a level are those of the one
-/// before, four times; whatever lies between is mixed.
-pub(crate) const KERNELS: [Kernels; 2] = [
-    Kernels {
-        fine: Taps {
-            blurs: &[(0.5, 1)],
-            diamond: false,
-        },
-        coarse: Taps {
-            blurs: &[(0.9, 1)],
-            diamond: false,
-        },
-    },
-    Kernels {
-        fine: Taps {
-            blurs: &[(0.5, 2), (0.95, 2), (1.9, 4)],
-            diamond: true,
-        },
-        coarse: Taps {
-            blurs: &[(1.0, 2), (1.6, 2)],
-            diamond: false,
-        },
-    },
-];
-
-/// Variance in square pixels of level `l` that going there and back blurs by: ¾·4ʲ on the way down
-/// and as much on the way up, for each level j below.
-pub(crate) fn own_blur(level: usize) -> f64 {
-    0.5 * (1.0 - f64::powi(0.25, level as i32))
-}
-
-impl Taps {
-    /// The variance that the weights of blur `i` need so that, cut off, they have `variance`.
-    pub fn exponent(&self, i: usize, variance: f64) -> f64 {
-        let reach = self.blurs[i].1;
-        let second_moment = |q: f64| {
-            let taps = self.weights(reach, q);
-            taps.iter()
-                .zip(-reach..)
-                .map(|(w, x)| w * f64::from(x * x))
-                .sum::<f64>()
-        };
-        let (mut low, mut high) = (1e-2, 1e3);
-        for _ in 0..60 {
-            let middle = f64::sqrt(low * high);
-            if second_moment(middle) < variance {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        low
-    }
-
-    /// The taps of blur `i`, of `variance`, that an edge along an axis sees: summed over the other.
-    fn marginal(&self, i: usize, variance: f64) -> Vec<f64> {
-        self.weights(self.blurs[i].1, self.exponent(i, variance))
-    }
-
-    fn weights(&self, reach: i32, q: f64) -> Vec<f64> {
-        let weight = |x: i32, y: i32| {
-            let inside = !self.diamond || x.abs() + y.abs() <= reach;
-            if inside {
-                (-f64::from(x * x + y * y) / (2.0 * q)).exp()
-            } else {
-                0.0
-            }
-        };
-        let column = |x| (-reach..=reach).map(|y| weight(x, y)).sum();
-        let mut taps: Vec<f64> = (-reach..=reach).map(column).collect();
-        let mass: f64 = taps.iter().sum();
-        taps.iter_mut().for_each(|w| *w /= mass);
-        taps
-    }
-}
 
 /// How a profile is scattered at a stated error: the weights of the blurs at every scale.
 ///
@@ -120,7 +28,7 @@ pub struct Plan {
     /// Levels above the frame.
     pub(crate) levels: usize,
     first_octave: f64,
-    /// A profile's rows, at scales a quarter of an octave apart.
+    /// A profile's rows, at scales a sixth of an octave apart.
     profiles: Vec<Vec<Row>>,
 }
 
@@ -136,7 +44,7 @@ pub struct Row {
 }
 
 /// Rows to an octave of scale; between two of them weights are interpolated.
-pub(crate) const ROWS_PER_OCTAVE: f64 = 4.0;
+pub(crate) const ROWS_PER_OCTAVE: f64 = 6.0;
 
 /// Levels that a plan may use: at the last, a pixel is 128 of the frame's.
 const MAX_LEVELS: usize = 7;
@@ -238,7 +146,7 @@ impl Plan {
         let Kernels { fine, coarse } = &self.kernels;
         match level {
             0 => 1 + j,
-            l => 1 + fine.blurs.len() + (l - 1) * coarse.blurs.len() + j,
+            l => 1 + fine.len() + (l - 1) * coarse.len() + j,
         }
     }
 
@@ -253,18 +161,21 @@ impl Plan {
     }
 
     /// The weights as the shaders have them: of each profile the rows, of each row the slots, and in
-    /// the last component of its first one the highest level.
+    /// the last component of its first one the highest level of all rows up to here.
     pub(crate) fn table(&self) -> Vec<Vec4> {
         let mut table = Vec::new();
-        for row in self.profiles.iter().flatten() {
-            let levels = 0..=self.levels;
-            let beyond = |l: usize| row.weights[self.slot(l + 1, 0)..].iter().sum::<Vec3>();
-            let rest: Vec<Vec3> = levels.map(beyond).collect();
-            let top = rest.iter().take_while(|r| **r != Vec3::ZERO).count();
-            let weights = row.weights.iter().chain(&rest).map(|w| w.extend(0.0));
-            let first = table.len();
-            table.extend(weights);
-            table[first].w = top as f32;
+        for rows in &self.profiles {
+            let mut top = 0;
+            for row in rows {
+                let levels = 0..=self.levels;
+                let beyond = |l: usize| row.weights[self.slot(l + 1, 0)..].iter().sum::<Vec3>();
+                let rest: Vec<Vec3> = levels.map(beyond).collect();
+                top = top.max(rest.iter().take_while(|r| **r != Vec3::ZERO).count());
+                let weights = row.weights.iter().chain(&rest).map(|w| w.extend(0.0));
+                let first = table.len();
+                table.extend(weights);
+                table[first].w = top as f32;
+            }
         }
         table
     }
@@ -290,7 +201,7 @@ impl Plan {
 /// σ of the widest Gaussian, in pixels, below which a profile does nothing worth a row.
 const LEAST_PX: f64 = 0.0625;
 
-/// The weights at one scale, of as few blurs of the frame itself as the error allows.
+/// The weights at one scale, without the squares that the error does not ask for.
 fn fit_row(
     responses: &Responses,
     kernels: &Kernels,
@@ -299,55 +210,71 @@ fn fit_row(
     max_error: f32,
 ) -> Row {
     let wanted = responses.wanted(profile, px_per_mm);
-    let fine = kernels.fine.blurs.len();
-    let mut row = fit_columns(responses, &wanted, fine..fine, px_per_mm, max_error);
-    for used in 1..fine {
-        let fewer = fit_columns(responses, &wanted, used..fine, px_per_mm, max_error);
-        if fewer.predicted_error <= max_error.min(2.0 * row.predicted_error) {
-            row = fewer;
+    let [fine, coarse] = [kernels.fine, kernels.coarse].map(|k| k.square_px2.is_some());
+    // From the cheapest on: a level has a quarter of the pixels of the one before.
+    let mut choices = vec![[false, false]];
+    choices.extend(coarse.then_some([false, true]));
+    choices.extend(fine.then_some([true, false]));
+    choices.extend((fine && coarse).then_some([true, true]));
+    let mut best: Option<Row> = None;
+    for squares in choices {
+        let row = fit_columns(responses, kernels, &wanted, squares, px_per_mm, max_error);
+        // Between two rows the error is a little larger than at either.
+        let enough = row.predicted_error <= 0.95 * max_error;
+        if best
+            .as_ref()
+            .is_none_or(|b| row.predicted_error < b.predicted_error)
+        {
+            best = Some(row);
+        }
+        if enough {
             break;
         }
     }
-    row
+    best.expect("there is a choice without squares")
 }
 
-/// The weights without some of the blurs of the frame itself.
+/// The weights with or without the square of the frame, and those of the levels.
 fn fit_columns(
     responses: &Responses,
+    kernels: &Kernels,
     wanted: &[Vec<f64>; 3],
-    unused: std::ops::Range<usize>,
+    [fine, coarse]: [bool; 2],
     px_per_mm: f64,
     max_error: f32,
 ) -> Row {
-    let unused = unused.start + 1..unused.end + 1;
+    let count = responses.columns[0].len();
+    let used: Vec<usize> = (0..count)
+        .filter(|i| {
+            let is_square = |kinds: &Kinds, j: usize| j == kinds.variances_px2.len();
+            match i.checked_sub(1) {
+                None => true,
+                Some(j) if j < kernels.fine.len() => fine || !is_square(&kernels.fine, j),
+                Some(j) => {
+                    let j = (j - kernels.fine.len()) % kernels.coarse.len();
+                    coarse || !is_square(&kernels.coarse, j)
+                }
+            }
+        })
+        .collect();
     let columns: Vec<Vec<f64>> = responses
         .columns
         .iter()
-        .map(|row| {
-            let mut row = row.clone();
-            row.drain(unused.clone());
-            row
-        })
+        .map(|row| used.iter().map(|i| row[*i]).collect())
         .collect();
-    let fits = wanted.each_ref().map(|wanted| {
-        let mut fit = nnls::minimax(&columns, wanted).0;
-        fit.splice(unused.start..unused.start, unused.clone().map(|_| 0.0));
-        fit
-    });
-    let mut weights: Vec<Vec3> = (0..fits[0].len())
-        .map(|i| DVec3::new(fits[0][i], fits[1][i], fits[2][i]).as_vec3())
-        .collect();
+    let mut weights = vec![Vec3::ZERO; count];
+    for (channel, wanted) in wanted.iter().enumerate() {
+        let fit = nnls::minimax(&columns, wanted).0;
+        for (i, weight) in used.iter().zip(fit) {
+            weights[*i][channel] = weight as f32;
+        }
+    }
     // What changes nothing is not worth its taps: its light goes to the next narrower blur.
-    for i in (1..weights.len()).rev() {
-        let too_small = weights[i].cmplt(Vec3::splat(0.05 * max_error));
-        let moved = Vec3::select(too_small, weights[i], Vec3::ZERO);
-        weights[i] -= moved;
-        let narrower = if unused.contains(&(i - 1)) {
-            unused.start - 1
-        } else {
-            i - 1
-        };
-        weights[narrower] += moved;
+    for pair in used.windows(2).rev() {
+        let too_small = weights[pair[1]].cmplt(Vec3::splat(0.05 * max_error));
+        let moved = Vec3::select(too_small, weights[pair[1]], Vec3::ZERO);
+        weights[pair[1]] -= moved;
+        weights[pair[0]] += moved;
     }
     Row {
         px_per_mm: px_per_mm as f32,
@@ -378,15 +305,16 @@ impl fmt::Display for Plan {
             self.max_error,
             self.predicted_error()
         )?;
-        for (what, taps) in [
+        for (what, kinds) in [
             ("the frame", self.kernels.fine),
             ("each level", self.kernels.coarse),
         ] {
             write!(f, "{what}:")?;
-            for (variance, reach) in taps.blurs {
-                write!(f, " {variance} px² by taps to {reach} px")?;
+            for blur in kinds.blurs() {
+                let taps = blur.shape.count();
+                write!(f, "  {} px² by {taps} taps", blur.variance_px2)?;
             }
-            writeln!(f, "{}", if taps.diamond { " in all" } else { "" })?;
+            writeln!(f)?;
         }
         for (rows, id) in self.profiles.iter().zip(1..) {
             writeln!(f, "profile {id}:  px/mm   error    weights")?;

@@ -85,7 +85,7 @@ pub(super) fn minimax(a: &[Vec<f64>], b: &[f64]) -> (Vec<f64>, f64) {
         let mut gram = vec![vec![SUM; n]; n];
         let mut rhs = vec![SUM; n];
         for ((row, b), w) in a.iter().zip(b).zip(&weights) {
-            if *w < 1e-12 {
+            if *w < 1e-8 {
                 continue;
             }
             for i in 0..n {

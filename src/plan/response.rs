@@ -1,18 +1,35 @@
-//! What the passes make of an edge, in one dimension: the columns that a plan's weights are fitted
-//! on. Edges along an axis are the worst; at other angles the phases of the pixels average.
+//! What the passes make of straight edges: the columns that a plan's weights are fitted on.
+//!
+//! A picture of an edge along a direction (a, b) of small integers is a signal over k = a·x + b·y, and
+//! so is all that blurs and downsampling make of it.
+
+use std::collections::BTreeMap;
 
 use libm::erfc;
 
-use super::{Kernels, own_blur};
+use super::Kernels;
+use super::kernels::Taps;
 use crate::Profile;
 
 /// Of the signals, in pixels; wide enough for the widest level.
 const LENGTH: usize = 8192;
 
-/// Where the edges lie, in pixels: every phase of the fine levels, some of the coarse ones.
-const SHIFTS: [f64; 10] = [0.0, 0.4, 1.0, 2.0, 3.0, 6.3, 13.0, 27.6, 54.0, 105.0];
+/// An edge that is passed through the pyramid: across which direction, soft by σ = 1 px or hard, and
+/// where the pixels that look at it lie.
+struct Edge {
+    across: [i32; 2],
+    soft: bool,
+    /// In pixels.
+    shift: f64,
+}
 
-/// An edge, where it is looked at, and what each kernel makes of it there.
+/// Along an axis, where phases matter most, every phase of the fine levels and some of the coarse ones.
+const SHIFTS: [f64; 10] = [0.0, 0.4, 1.0, 2.0, 3.0, 6.3, 13.0, 27.6, 54.0, 105.0];
+/// At 45° and 27°.
+const OBLIQUE: [[i32; 2]; 2] = [[1, 1], [2, 1]];
+const OBLIQUE_SHIFTS: [f64; 3] = [0.3, 2.0, 13.0];
+
+/// Edges, where they are looked at, and what each kernel makes of them there.
 pub(super) struct Responses {
     samples: Vec<Sample>,
     /// A row a sample, a column a kernel: the light that stays first.
@@ -20,42 +37,34 @@ pub(super) struct Responses {
 }
 
 struct Sample {
+    across: [i32; 2],
+    soft: bool,
     /// Distance from the edge, in pixels.
     x: f64,
-    /// Whether the edge is soft by σ = 1 px, not hard.
-    soft: bool,
 }
 
 impl Responses {
     pub fn new(kernels: &Kernels, levels: usize) -> Self {
-        let middle = LENGTH / 2;
-        let mut offsets: Vec<usize> = (0..8).collect();
-        let mut offset = 8.0;
-        while offset < 0.42 * LENGTH as f64 {
-            offsets.push(offset as usize);
-            offset *= 1.18;
+        let mut edges = Vec::new();
+        for soft in [true, false] {
+            let edge = |across: [i32; 2]| {
+                move |shift: f64| Edge {
+                    across,
+                    soft,
+                    shift,
+                }
+            };
+            edges.extend(SHIFTS.map(edge([1, 0])));
+            for across in OBLIQUE {
+                edges.extend(OBLIQUE_SHIFTS.map(edge(across)));
+            }
         }
         let mut responses = Self {
             samples: Vec::new(),
             columns: Vec::new(),
         };
-        for shift in SHIFTS {
-            for soft in [true, false] {
-                // Pixels know of a hard edge only between which two it lies.
-                let shift = if soft { shift } else { shift.floor() };
-                let x = |i: usize| i as f64 + 0.5 - middle as f64 + shift;
-                let edge = |i: usize| match soft {
-                    true => step(x(i), 1.0),
-                    false => f64::from(x(i) > 0.0),
-                };
-                let edge: Vec<f64> = (0..LENGTH).map(edge).collect();
-                let passed = kernels.pass(&edge, levels);
-                for offset in offsets.iter().flat_map(|o| [middle + o, middle - 1 - o]) {
-                    responses.samples.push(Sample { x: x(offset), soft });
-                    let column = passed.iter().map(|p| p[offset]);
-                    responses.columns.push(column.collect());
-                }
-            }
+        for edge in &edges {
+            edge.pass(kernels, levels, &edge.pixels(), &mut responses);
         }
         responses
     }
@@ -69,21 +78,24 @@ impl Responses {
             .iter()
             .map(|g| {
                 let px2 = f64::from(g.variance_mm2) * px_per_mm * px_per_mm;
-                (g.weight.as_dvec3(), px2, lattice_steps(px2))
+                let directions = [[1, 0], OBLIQUE[0], OBLIQUE[1]];
+                let steps = directions.map(|across| (across, lattice_steps(across, px2)));
+                (g.weight.as_dvec3(), px2, steps)
             })
             .collect();
         let mut wanted = [const { Vec::new() }; 3];
         for sample in &self.samples {
             let mut sum = glam::DVec3::ZERO;
             for (weight, px2, steps) in &gaussians {
-                let passed = match (sample.soft, steps) {
-                    (true, _) => step(sample.x, px2 + 1.0),
-                    (false, None) => step(sample.x, *px2),
-                    (false, Some(steps)) => {
-                        let beyond = steps.get((sample.x.abs() - 0.5) as usize);
-                        let above = 1.0 - beyond.unwrap_or(&0.0);
+                let steps = steps.iter().find(|(across, _)| *across == sample.across);
+                let passed = match steps {
+                    _ if sample.soft => step(sample.x, px2 + 1.0),
+                    Some((across, Some(beyond))) => {
+                        let n = (sample.x.abs() * length(*across) - 0.5).round() as usize;
+                        let above = 1.0 - beyond.get(n).unwrap_or(&0.0);
                         if sample.x > 0.0 { above } else { 1.0 - above }
                     }
+                    _ => step(sample.x, *px2),
                 };
                 sum += *weight * passed;
             }
@@ -95,6 +107,10 @@ impl Responses {
     }
 }
 
+fn length([a, b]: [i32; 2]) -> f64 {
+    f64::from(a * a + b * b).sqrt()
+}
+
 /// ½(1 + erf(x/√2v)), a unit edge that a Gaussian has passed over.
 fn step(x: f64, variance: f64) -> f64 {
     if variance == 0.0 {
@@ -103,24 +119,34 @@ fn step(x: f64, variance: f64) -> f64 {
     0.5 * erfc(-x / (2.0 * variance).sqrt())
 }
 
-/// The share of the light that point weights on the lattice put beyond n + ½ pixels on one side, n
+/// The share of the light that point weights on the lattice put beyond n + ½ steps of k on one side, n
 /// from 0; of wide Gaussians none, since the lattice no longer matters.
-fn lattice_steps(variance_px2: f64) -> Option<Vec<f64>> {
+fn lattice_steps(across: [i32; 2], variance_px2: f64) -> Option<Vec<f64>> {
     // Beyond, the sum over half the lattice is within 1e-4 of the integral.
     if variance_px2 > 100.0 {
         return None;
     }
     let s = lattice_variance(variance_px2);
-    let weight = |n: usize| (-((n * n) as f64) / (2.0 * s)).exp();
-    let reach = (7.0 * s.sqrt()).ceil() as usize + 1;
-    let mass: f64 = weight(0) + 2.0 * (1..=reach).map(weight).sum::<f64>();
+    let reach = (7.0 * s.sqrt()).ceil() as i32 + 1;
+    let weight = |n: i32| (-f64::from(n * n) / (2.0 * s)).exp();
+    let mass: f64 = (-reach..=reach).map(weight).sum();
+    let of_row: Vec<(i32, f64)> = (-reach..=reach).map(|n| (n, weight(n) / mass)).collect();
+    let taps = product(&of_row, &of_row);
+    let projected = projected(&taps, across);
+    let last = projected.last()?.0 as usize;
+    let mut at = vec![0.0; last + 2];
+    for (k, w) in &projected {
+        if let Ok(k) = usize::try_from(*k) {
+            at[k] = *w;
+        }
+    }
+    // Beyond n + ½: from n + 1 on.
     let mut beyond = 0.0;
-    let mut steps: Vec<f64> = (0..=reach)
+    let mut steps: Vec<f64> = (0..=last)
         .rev()
         .map(|n| {
-            let step = beyond / mass;
-            beyond += weight(n);
-            step
+            beyond += at[n + 1];
+            beyond
         })
         .collect();
     steps.reverse();
@@ -143,62 +169,157 @@ fn lattice_variance(s: f64) -> f64 {
     -0.5 / w.ln()
 }
 
-impl Kernels {
-    /// What each kernel makes of a signal, at its own resolution and brought back to the pixels'; the
-    /// signal itself first.
-    fn pass(&self, signal: &[f64], levels: usize) -> Vec<Vec<f64>> {
-        let mut columns = vec![signal.to_vec()];
-        for (i, (variance, _)) in self.fine.blurs.iter().enumerate() {
-            columns.push(blurred(signal, &self.fine.marginal(i, *variance)));
+fn product(rows: &[(i32, f64)], columns: &[(i32, f64)]) -> Taps {
+    let pair = |(x, u): &(i32, f64), (y, v): &(i32, f64)| ([*x, *y], u * v);
+    let taps = rows
+        .iter()
+        .flat_map(|r| columns.iter().map(move |c| pair(r, c)));
+    taps.collect()
+}
+
+/// The same over k.
+fn projected(taps: &Taps, [a, b]: [i32; 2]) -> Vec<(i32, f64)> {
+    let mut sums = BTreeMap::new();
+    for ([x, y], w) in taps {
+        *sums.entry(a * x + b * y).or_insert(0.0) += w;
+    }
+    sums.into_iter().collect()
+}
+
+/// A picture that depends on k alone and goes on as it ends.
+struct Signal {
+    /// k of the first value.
+    first: i32,
+    values: Vec<f64>,
+}
+
+impl Signal {
+    fn at(&self, k: i32) -> f64 {
+        let last = self.values.len() as i32 - 1;
+        self.values[(k - self.first).clamp(0, last) as usize]
+    }
+
+    fn sum(&self, k: i32, taps: &[(i32, f64)]) -> f64 {
+        taps.iter().map(|(offset, w)| w * self.at(k + offset)).sum()
+    }
+
+    fn downsampled(&self, across: [i32; 2]) -> Self {
+        let row = [(-1, 0.125), (0, 0.375), (1, 0.375), (2, 0.125)];
+        let taps = projected(&product(&row, &row), across);
+        let first = self.first / 2;
+        let values = (0..self.values.len() as i32 / 2).map(|i| self.sum(2 * (first + i), &taps));
+        Self {
+            first,
+            values: values.collect(),
         }
-        let mut level = signal.to_vec();
-        for l in 1..=levels {
-            level = downsampled(&level);
-            for (i, (variance, _)) in self.coarse.blurs.iter().enumerate() {
-                let remains = variance - own_blur(l);
-                let mut passed = blurred(&level, &self.coarse.marginal(i, remains));
-                for _ in 0..l {
-                    passed = upsampled(&passed);
-                }
-                columns.push(passed);
-            }
-        }
-        columns
     }
 }
 
-/// A value of a signal that goes on as it ends.
-fn at(signal: &[f64], i: isize) -> f64 {
-    signal[i.clamp(0, signal.len() as isize - 1) as usize]
+/// The pixels of the next level that a pixel is interpolated from, of one axis.
+fn upsampling(pixel: i32) -> [(i32, f64); 2] {
+    let near = pixel.div_euclid(2);
+    let other = if pixel.rem_euclid(2) == 0 {
+        near - 1
+    } else {
+        near + 1
+    };
+    [(near, 0.75), (other, 0.25)]
 }
 
-/// `taps` reach as far to both sides.
-fn blurred(signal: &[f64], taps: &[f64]) -> Vec<f64> {
-    let reach = taps.len() as isize / 2;
-    let sum = |i| {
-        let terms = taps.iter().zip(-reach..);
-        terms
-            .map(|(tap, offset)| tap * at(signal, i + offset))
-            .sum()
-    };
-    (0..signal.len() as isize).map(sum).collect()
+/// Those of level `l` that a pixel of the frame is interpolated from, level by level.
+fn interpolation(pixel: i32, l: usize) -> Vec<(i32, f64)> {
+    let mut pixels = BTreeMap::from([(pixel, 1.0)]);
+    for _ in 0..l {
+        let mut coarser = BTreeMap::new();
+        for (pixel, w) in pixels {
+            for (next, share) in upsampling(pixel) {
+                *coarser.entry(next).or_insert(0.0) += w * share;
+            }
+        }
+        pixels = coarser;
+    }
+    pixels.into_iter().collect()
 }
 
-fn downsampled(signal: &[f64]) -> Vec<f64> {
-    let pair = |i| (at(signal, 2 * i), at(signal, 2 * i + 1));
-    let sum = |i| {
-        let (a, b) = pair(i);
-        0.125 * (at(signal, 2 * i - 1) + at(signal, 2 * i + 2)) + 0.375 * (a + b)
-    };
-    (0..signal.len() as isize / 2).map(sum).collect()
-}
+impl Edge {
+    /// k of a pixel that lies on the edge, or of a hard one just beyond it; then the distance from the
+    /// edge that follows from k.
+    fn distance(&self, k: i32) -> f64 {
+        let n = length(self.across);
+        if self.soft {
+            // The edge goes through the corner of a pixel, shifted.
+            let corner = f64::from(self.across[0] + self.across[1]) / 2.0;
+            return (f64::from(k) + corner) / n + self.shift;
+        }
+        // Pixels know of a hard edge only between which two it lies.
+        (f64::from(k) + 0.5 + (self.shift * n).floor()) / n
+    }
 
-fn upsampled(signal: &[f64]) -> Vec<f64> {
-    let between = |i: isize| {
-        let other = if i % 2 == 0 { i / 2 - 1 } else { i / 2 + 1 };
-        0.75 * at(signal, i / 2) + 0.25 * at(signal, other)
-    };
-    (0..2 * signal.len() as isize).map(between).collect()
+    fn pass(&self, kernels: &Kernels, levels: usize, pixels: &[[i32; 2]], to: &mut Responses) {
+        let n = length(self.across);
+        let half = (LENGTH as f64 / 2.0 * n) as i32;
+        let edge = |k| match self.soft {
+            true => step(self.distance(k), 1.0),
+            false => f64::from(self.distance(k) > 0.0),
+        };
+        let frame = Signal {
+            first: -half,
+            values: (-half..half).map(edge).collect(),
+        };
+        let first = to.columns.len();
+        for [x, y] in pixels {
+            let k = self.across[0] * x + self.across[1] * y;
+            to.samples.push(Sample {
+                across: self.across,
+                soft: self.soft,
+                x: self.distance(k),
+            });
+            let mut columns = vec![frame.at(k)];
+            for blur in kernels.fine.blurs() {
+                columns.push(frame.sum(k, &projected(&blur.taps(0), self.across)));
+            }
+            to.columns.push(columns);
+        }
+        let mut signal = frame;
+        for l in 1..=levels {
+            signal = signal.downsampled(self.across);
+            let kernels = kernels
+                .coarse
+                .blurs()
+                .map(|b| projected(&b.taps(l), self.across));
+            let kernels: Vec<_> = kernels.collect();
+            for ([x, y], columns) in pixels.iter().zip(&mut to.columns[first..]) {
+                let from = projected(
+                    &product(&interpolation(*x, l), &interpolation(*y, l)),
+                    self.across,
+                );
+                for kernel in &kernels {
+                    let sum = from.iter().map(|(k, w)| w * signal.sum(*k, kernel));
+                    columns.push(sum.sum());
+                }
+            }
+        }
+    }
+
+    /// Pixels on both sides of the edge, further and further apart.
+    fn pixels(&self) -> Vec<[i32; 2]> {
+        let reach = 0.42 * LENGTH as f64;
+        let mut offsets: Vec<i32> = (0..8).collect();
+        let mut offset = 8.0;
+        while offset < reach {
+            offsets.push(offset as i32);
+            offset *= 1.18;
+        }
+        // Along an oblique edge a pixel's column may be even or odd at the same distance.
+        let [a, b] = self.across;
+        let column = |i: usize| if b == 0 { 0 } else { (i as i32 % 4) - 2 };
+        let place = |(i, offset): (usize, i32)| {
+            let k = (f64::from(offset) * length([a, b])).round() as i32;
+            [(k - b * column(i)).div_euclid(a), column(i)]
+        };
+        let both = offsets.iter().flat_map(|o| [*o, -1 - o]);
+        both.enumerate().map(place).collect()
+    }
 }
 
 #[cfg(test)]
@@ -209,36 +330,42 @@ mod tests {
     #[test]
     fn every_kernel_has_its_variance() {
         // The second moment of the response to an edge is the sum of all variances.
-        let middle = LENGTH as f64 / 2.0;
-        let edge: Vec<f64> = (0..LENGTH)
-            .map(|i| step(i as f64 + 0.5 - middle, 1.0))
-            .collect();
-        for kernels in KERNELS {
-            let columns = kernels.pass(&edge, 3);
-            let fine = kernels.fine.blurs.iter().map(|b| b.0);
-            let coarse = |l| {
-                kernels
-                    .coarse
-                    .blurs
-                    .iter()
-                    .map(move |b| b.0 * f64::powi(4.0, l))
+        for across in [[1, 0], OBLIQUE[0]] {
+            let edge = Edge {
+                across,
+                soft: true,
+                shift: 0.3,
             };
-            let wanted = [0.0]
-                .into_iter()
-                .chain(fine)
-                .chain((1..=3).flat_map(coarse));
-            for (column, variance) in columns.iter().zip(wanted) {
-                let moment: f64 = column
-                    .windows(2)
-                    .zip(1..)
-                    .map(|(pair, i)| (pair[1] - pair[0]) * (i as f64 - middle).powi(2))
-                    .sum();
-                // Differences of neighbours see the edge through a pixel: 1/12 px² more.
-                let found = moment - 1.0 - 1.0 / 12.0;
-                assert!(
-                    (found - variance).abs() < 0.02 * variance + 1e-3,
-                    "{found} for {variance}"
-                );
+            // One pixel after the other along a row.
+            let pixels: Vec<_> = (-160..160).map(|x| [x, 0]).collect();
+            for kernels in KERNELS {
+                let mut passed = Responses {
+                    samples: Vec::new(),
+                    columns: Vec::new(),
+                };
+                edge.pass(&kernels, 3, &pixels, &mut passed);
+                let fine = kernels.fine.blurs().map(|b| b.variance_px2);
+                let coarse = |l| {
+                    let blurs = kernels.coarse.blurs();
+                    blurs.map(move |b| b.variance_px2 * f64::powi(4.0, l))
+                };
+                let wanted = [0.0]
+                    .into_iter()
+                    .chain(fine)
+                    .chain((1..=3).flat_map(coarse));
+                for (j, variance) in wanted.enumerate() {
+                    let differences = passed.columns.windows(2).zip(passed.samples.windows(2));
+                    let moment: f64 = differences
+                        .map(|(c, s)| (c[1][j] - c[0][j]) * (0.5 * (s[0].x + s[1].x)).powi(2))
+                        .sum();
+                    // Differences of neighbours see the edge through the step between them.
+                    let between = (passed.samples[1].x - passed.samples[0].x).powi(2) / 12.0;
+                    let found = moment - 1.0 - between;
+                    assert!(
+                        (found - variance).abs() < 0.02 * variance + 1e-3,
+                        "{across:?}, {j}: {found} for {variance}"
+                    );
+                }
             }
         }
     }

@@ -1,0 +1,84 @@
+// The frame as the pyramid has it: light and area, and where the surface is. Follows surface.wgsl.
+
+@group(0) @binding(4) var irradiance: texture_2d<f32>;
+@group(0) @binding(5) var depth: texture_2d<f32>;
+@group(0) @binding(6) var profile_id: texture_2d<u32>;
+// Of each tile, a bit for each level at which it is not flat.
+@group(0) @binding(11) var<storage, read_write> bends: array<atomic<u32>>;
+
+// Second differences of depth, over the mm of a pixel, up to which a level is flat.
+const FLAT = 0.05;
+// Levels that may have flat tiles; as in tiles.wgsl.
+const FLAT_LEVELS = 3u;
+// Pixels that taps reach on flat tiles; as in tiles.wgsl.
+const RING = 4;
+
+fn z_at(pixel: vec2i) -> f32 {
+    let d = textureLoad(depth, pixel, 0).r;
+    let c = view.depth_to_mm;
+    return (c.x * d + c.y) / (c.z * d + c.w);
+}
+
+// ∂z over the mm of a pixel: the mean of both sides where they agree, the shorter where one jumps.
+fn tangent(forward: f32, backward: f32, mm: f32) -> f32 {
+    let f = forward * forward + mm * mm;
+    let b = backward * backward + mm * mm;
+    // A factor of two in length is more than a smooth surface changes in a pixel.
+    let mean = max(f, b) <= 4.0 * min(f, b);
+    let shorter = select(backward, forward, f < b);
+    let dz = select(shorter, 0.5 * (forward + backward), mean);
+    // What jumps on both sides faces the camera for all that is known.
+    return select(0.0, dz / mm, abs(dz) < 40.0 * mm);
+}
+
+// Tells all tiles whose taps see this pixel at which levels it bends.
+fn mark_bent(pixel: vec2i, bent: u32, size: vec2i) {
+    let columns = (u32(size.x) + TILE - 1u) / TILE;
+    let first = vec2u(max(pixel - RING, vec2i(0))) / TILE;
+    let last = vec2u(min(pixel + RING, size - 1)) / TILE;
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            atomicOr(&bends[y * columns + x], bent);
+        }
+    }
+}
+
+@fragment
+fn fs_pack(@builtin(position) at: vec4f) -> Surface {
+    let pixel = vec2i(at.xy);
+    let none = Surface(vec4f(0.0), vec2u(0u));
+    let id = textureLoad(profile_id, pixel, 0).r;
+    if id == 0u || id > view.profiles {
+        return none;
+    }
+    let size = vec2i(textureDimensions(depth));
+    let last = size - 1;
+    let z = z_at(pixel);
+    // Infinitely far away there is no surface.
+    if !(abs(z) < 3e38) {
+        return none;
+    }
+    let left = z_at(vec2i(max(pixel.x - 1, 0), pixel.y));
+    let right = z_at(vec2i(min(pixel.x + 1, last.x), pixel.y));
+    let above = z_at(vec2i(pixel.x, max(pixel.y - 1, 0)));
+    let below = z_at(vec2i(pixel.x, min(pixel.y + 1, last.y)));
+    let mm = mm_per_px(z);
+    // At the border one side alone is known.
+    let west = select(z - left, right - z, pixel.x == 0);
+    let east = select(right - z, z - left, pixel.x == last.x);
+    let north = select(z - above, below - z, pixel.y == 0);
+    let south = select(below - z, z - above, pixel.y == last.y);
+    // Twice as much at each level; half of it is what a pixel is off the plane of its neighbour.
+    let bend = max(abs(east - west) / mm.x, abs(south - north) / mm.y);
+    if bend > FLAT / f32(1u << (FLAT_LEVELS - 1u)) {
+        // 0 where all levels are bent, FLAT_LEVELS − 1 where the last is.
+        let flat_levels = u32(max(ceil(log2(FLAT / bend)), 0.0));
+        mark_bent(pixel, (1u << FLAT_LEVELS) - (1u << flat_levels), size);
+    }
+    let shape = Shape(id, z, vec2f(tangent(east, west, mm.x), tangent(south, north, mm.y)));
+    let plane = plane_of(pixel, shape);
+    let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
+    // What is packed is half floats, which end there.
+    let light = min(textureLoad(irradiance, pixel, 0).rgb, vec3f(65504.0));
+    return Surface(half_floats(vec4f(light, area)), packed(shape));
+}

@@ -1,0 +1,139 @@
+// What the passes over the pyramid share: surfaces, packed, and the planes through them.
+//
+// [LS15] Li & Shao 2015, "GPU-based face rendering via the physical model of light interaction
+//        with human skin".
+
+struct View {
+    // p.xy = (u + ∂u·at)·z + (v + ∂v·at) for the pixel at `at`: x and y of u and v, then of ∂u and ∂v.
+    origin: vec4f,
+    step: vec4f,
+    // z = (x·depth + y)/(z·depth + w), in mm.
+    depth_to_mm: vec4f,
+    first_octave: f32,
+    rows: u32,
+    stride: u32,
+    profiles: u32,
+}
+
+// A Gaussian, cut off by a shape of taps.
+struct Blur {
+    // In square pixels of the level, and how much of it is the pyramid's own blur.
+    variance: f32,
+    own: f32,
+    // What taps of this shape can have at most, and up to what they are three columns.
+    limit: f32,
+    narrow: f32,
+    // Inverse variance of the weights that have a variance when cut off, over its own: with t the
+    // variance over `limit`, (1 − t)(x/t + y + z·t + w·t²).
+    sharpness: vec4f,
+    // Its place in a row of weights.
+    slot: u32,
+}
+
+struct Level {
+    // Up to three that share their taps; the last one has those of the square.
+    blurs: array<Blur, 4>,
+    // Of this level, in its pixels.
+    size: vec2f,
+    // Pixels of the frame to one of this level.
+    scale: f32,
+    // Where the weights of all coarser levels together are in a row.
+    rest: u32,
+    // 1 where there is a coarser level.
+    coarser: u32,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var<uniform> level: Level;
+// x in the low half: those that are simple from the front on, the others from the end.
+@group(0) @binding(2) var<storage, read> tiles: array<u32>;
+
+// Whether a tile may hold whatever there is; else it is skin of one profile throughout, nearly flat,
+// and so are the pixels around it.
+override CAREFUL: bool = true;
+
+const TILE = 16u;
+// How far from the plane a pixel may lie to be of the same surface, in mm a pixel of the level.
+const TOLERANCE = 1.0;
+// A pixel that is hardly of any surface still is of one.
+const LEAST_AREA = 1e-3;
+
+// Two triangles to a tile.
+@vertex
+fn vs_tile(
+    @builtin(vertex_index) vertex: u32,
+    @builtin(instance_index) instance: u32,
+) -> @builtin(position) vec4f {
+    let tile = tiles[select(instance, arrayLength(&tiles) - 1u - instance, CAREFUL)];
+    // Corners in the order of 0 0, 1 0, 0 1, 1 0, 1 1, 0 1.
+    let corner = vec2u((0x1au >> vertex) & 1u, (0x34u >> vertex) & 1u);
+    let uv = vec2f((vec2u(tile & 0xffffu, tile >> 16u) + corner) * TILE) / level.size;
+    return vec4f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, 0.0, 1.0);
+}
+
+// The two textures that hold a surface.
+struct Surface {
+    // Light, and area over that of a surface that faces the camera; less where part of the pixel is
+    // not of it.
+    @location(0) light: vec4f,
+    @location(1) shape: vec2u,
+}
+
+// Where a surface is.
+struct Shape {
+    // 0: no surface.
+    id: u32,
+    // In mm, negative.
+    z: f32,
+    // ∂z over the mm between pixels, along a row and along a column.
+    tangent: vec2f,
+}
+
+// Half floats that stores keep as they are, whether they round or truncate.
+fn half_floats(v: vec4f) -> vec4f {
+    return vec4f(unpack2x16float(pack2x16float(v.xy)), unpack2x16float(pack2x16float(v.zw)));
+}
+
+// Slopes are kept as sines.
+fn packed(shape: Shape) -> vec2u {
+    let sine = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);
+    let steps = vec2u(clamp(sine * 2047.0 + 2048.5, vec2f(0.0), vec2f(4095.0)));
+    return vec2u(shape.id << 24u | steps.y << 12u | steps.x, bitcast<u32>(shape.z));
+}
+
+fn unpacked(shape: vec2u) -> Shape {
+    let sine = (vec2f(vec2u(shape.x, shape.x >> 12u) & vec2u(0xfffu)) - 2048.0) / 2047.0;
+    let tangent = sine * inverseSqrt(max(1.0 - sine * sine, vec2f(4e-4)));
+    return Shape(shape.x >> 24u, bitcast<f32>(shape.y), tangent);
+}
+
+// p.xy over z, and the rest, at a pixel of this level.
+fn ray(pixel: vec2i) -> vec4f {
+    let at = (vec2f(pixel) + 0.5) * level.scale;
+    return view.origin + view.step * at.xyxy;
+}
+
+// The mm between pixels of this level on a surface that faces the camera.
+fn mm_per_px(z: f32) -> vec2f {
+    return abs(view.step.xy * z + view.step.zw) * level.scale;
+}
+
+// The plane through the surface at a pixel, in steps of a pixel.
+struct Plane {
+    z: f32,
+    dx: vec3f,
+    dy: vec3f,
+    // Along a ray all of p grows by (ray, 1) for one of z.
+    ray: vec2f,
+    // M = JᵀJ: M₀₀, M₀₁, M₁₁, in mm².
+    m: vec3f,
+}
+
+fn plane_of(pixel: vec2i, shape: Shape) -> Plane {
+    let r = ray(pixel);
+    let mm = (view.step.xy * shape.z + view.step.zw) * level.scale;
+    let dz = shape.tangent * abs(mm);
+    let dx = vec3f(r.xy * dz.x + vec2f(mm.x, 0.0), dz.x);
+    let dy = vec3f(r.xy * dz.y + vec2f(0.0, mm.y), dz.y);
+    return Plane(shape.z, dx, dy, r.xy, vec3f(dot(dx, dx), dot(dx, dy), dot(dy, dy)));
+}

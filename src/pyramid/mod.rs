@@ -1,0 +1,338 @@
+//! Scattering by a plan, over a pyramid of the frame: drives `shaders/tiles.wgsl`, and the passes
+//! over tiles that follow `shaders/surface.wgsl`.
+
+mod passes;
+mod scratch;
+
+use glam::Vec4;
+use wgpu::{
+    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, Queue, Sampler, TextureFormat,
+    TextureView,
+};
+
+use crate::gaussian_sum::scratch_view;
+use crate::plan::Plan;
+use passes::{Compute, Draw, LIGHT, Passes, Shaders, begin};
+use scratch::{DRAW_BYTES, LevelScratch, Scratch, View};
+
+/// Where a frame's pixels are, in mm.
+pub(crate) struct Optics {
+    /// x and y over z of the surface at the corner of the frame, then the part that is not over z.
+    pub origin: Vec4,
+    /// The same for a step of one pixel.
+    pub step: Vec4,
+    /// z = (x·depth + y)/(z·depth + w).
+    pub depth_to_mm: Vec4,
+}
+
+/// What a frame hands over, already checked.
+pub(crate) struct Inputs<'a> {
+    pub irradiance: &'a TextureView,
+    pub depth: &'a TextureView,
+    pub profile_id: &'a TextureView,
+    pub output: &'a TextureView,
+    pub optics: Optics,
+    pub plan: &'a Plan,
+}
+
+/// The passes, and what they need for the frame that was last prepared.
+pub(crate) struct Pyramid {
+    output_format: TextureFormat,
+    shaders: Shaders,
+    linear: Sampler,
+    planned: Option<Planned>,
+    scratch: Option<Scratch>,
+    frame: Option<Frame>,
+}
+
+/// What follows from the plan.
+struct Planned {
+    plan: Plan,
+    weights: Buffer,
+    passes: Passes,
+}
+
+/// The groups of one frame.
+struct Frame {
+    inputs: [TextureView; 4],
+    mark: BindGroup,
+    gather: Vec<BindGroup>,
+    pack: BindGroup,
+    /// Of each level from 1 on.
+    halve: Vec<BindGroup>,
+    level: Vec<BindGroup>,
+    frame: BindGroup,
+    copy: BindGroup,
+}
+
+impl Pyramid {
+    pub fn new(device: &Device, output_format: TextureFormat) -> Self {
+        Self {
+            output_format,
+            shaders: Shaders::new(device),
+            linear: device.create_sampler(&wgpu::SamplerDescriptor {
+                label: Some("subsurface linear"),
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                ..Default::default()
+            }),
+            planned: None,
+            scratch: None,
+            frame: None,
+        }
+    }
+
+    /// Uploads what the frame needs; makes anew what a new plan, size or texture asks for.
+    pub fn prepare(&mut self, device: &Device, queue: &Queue, inputs: &Inputs) {
+        let size = crate::input::size(inputs.irradiance);
+        if self.planned.as_ref().is_none_or(|p| p.plan != *inputs.plan) {
+            self.scratch = None;
+            self.frame = None;
+            self.planned = Some(Planned {
+                plan: inputs.plan.clone(),
+                weights: weights(device, inputs.plan),
+                passes: Passes::new(device, &self.shaders, inputs.plan, self.output_format),
+            });
+        }
+        let Some(planned) = &self.planned else { return };
+        if self.scratch.as_ref().is_none_or(|s| s.size != size) {
+            self.frame = None;
+            self.scratch = None; // The old one goes before the new one comes.
+            self.scratch = Some(Scratch::new(device, queue, size, &planned.plan));
+        }
+        let Some(scratch) = &self.scratch else { return };
+        let plan = &planned.plan;
+        let optics = &inputs.optics;
+        let view = View {
+            origin: optics.origin,
+            step: optics.step,
+            depth_to_mm: optics.depth_to_mm,
+            first_octave: plan.first_octave(),
+            rows: plan.row_count() as u32,
+            stride: plan.stride() as u32,
+            profiles: plan.profile_count() as u32,
+        };
+        queue.write_buffer(&scratch.view, 0, bytemuck::bytes_of(&view));
+        let views = [
+            inputs.irradiance,
+            inputs.depth,
+            inputs.profile_id,
+            inputs.output,
+        ];
+        let same = |f: &Frame| f.inputs.iter().zip(views).all(|(a, b)| a == b);
+        if !self.frame.as_ref().is_some_and(same) {
+            self.frame = Some(Frame::new(device, &self.linear, planned, scratch, views));
+        }
+    }
+
+    pub fn render(&self, encoder: &mut CommandEncoder) {
+        let (Some(planned), Some(scratch), Some(frame)) =
+            (&self.planned, &self.scratch, &self.frame)
+        else {
+            return;
+        };
+        let passes = &planned.passes;
+        let [base, coarser @ ..] = &scratch.levels[..] else {
+            return;
+        };
+        for level in &scratch.levels {
+            forget_tiles(encoder, level);
+        }
+        encoder.clear_buffer(&scratch.bends, 0, None);
+        {
+            let mut pass = begin_compute(encoder, "subsurface tiles");
+            let [x, y] = base.tiles;
+            pass.set_pipeline(&passes.mark.pipeline);
+            pass.set_bind_group(0, &frame.mark, &[]);
+            pass.dispatch_workgroups(x, y, 1);
+            // All of the frame's; which of them are simple shows when they are packed.
+            gather(&mut pass, &passes.gather, &frame.gather[0], base);
+        }
+        {
+            let targets = [&base.light, &base.shape];
+            let mut pass = begin(encoder, "subsurface pack", &targets, true);
+            over_tiles(&mut pass, passes.pack.each_ref(), &frame.pack, base);
+        }
+        forget_tiles(encoder, base);
+        {
+            let mut pass = begin_compute(encoder, "subsurface simple tiles");
+            for (group, level) in frame.gather.iter().zip(&scratch.levels) {
+                gather(&mut pass, &passes.gather, group, level);
+            }
+        }
+        for (group, level) in frame.halve.iter().zip(coarser) {
+            let targets = [&level.light, &level.shape];
+            let mut pass = begin(encoder, "subsurface halve", &targets, true);
+            over_tiles(&mut pass, passes.halve.each_ref(), group, level);
+        }
+        for l in (1..scratch.levels.len()).rev() {
+            let (group, level) = (&frame.level[l - 1], &scratch.levels[l]);
+            // Means are read where this level has a surface, and there they are drawn.
+            let mut pass = begin(encoder, "subsurface level", &[scratch.mean(l)], false);
+            let [x, y] = level.size.map(|s| s as f32);
+            pass.set_viewport(0.0, 0.0, x, y, 0.0, 1.0);
+            over_tiles(&mut pass, passes.level.each_ref(), group, level);
+        }
+        let output = &frame.inputs[3];
+        let mut pass = begin(encoder, "subsurface frame", &[output], true);
+        pass.set_pipeline(&passes.copy.pipeline);
+        pass.set_bind_group(0, &frame.copy, &[]);
+        pass.draw(0..3, 0..1);
+        over_tiles(&mut pass, passes.frame.each_ref(), &frame.frame, base);
+    }
+}
+
+fn forget_tiles(encoder: &mut CommandEncoder, level: &LevelScratch) {
+    for i in 0..2 {
+        encoder.clear_buffer(&level.draws, i * DRAW_BYTES + 4, Some(4));
+    }
+}
+
+fn begin_compute<'a>(encoder: &'a mut CommandEncoder, label: &str) -> wgpu::ComputePass<'a> {
+    encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+        label: Some(label),
+        timestamp_writes: None,
+    })
+}
+
+fn gather(pass: &mut wgpu::ComputePass, to: &Compute, group: &BindGroup, level: &LevelScratch) {
+    let [x, y] = level.tiles;
+    pass.set_pipeline(&to.pipeline);
+    pass.set_bind_group(0, group, &[]);
+    pass.dispatch_workgroups(x.div_ceil(8), y.div_ceil(8), 1);
+}
+
+/// Draws the simple tiles of a level by the first, the others by the second.
+fn over_tiles(
+    pass: &mut wgpu::RenderPass,
+    draws: [&Draw; 2],
+    group: &BindGroup,
+    level: &LevelScratch,
+) {
+    pass.set_bind_group(0, group, &[]);
+    for (i, draw) in (0..).zip(draws) {
+        pass.set_pipeline(&draw.pipeline);
+        pass.draw_indirect(&level.draws, i * DRAW_BYTES);
+    }
+}
+
+fn weights(device: &Device, plan: &Plan) -> Buffer {
+    use wgpu::util::DeviceExt;
+    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("subsurface weights"),
+        contents: bytemuck::cast_slice(&plan.table()),
+        usage: wgpu::BufferUsages::STORAGE,
+    })
+}
+
+impl Frame {
+    fn new(
+        device: &Device,
+        linear: &Sampler,
+        planned: &Planned,
+        scratch: &Scratch,
+        views: [&TextureView; 4],
+    ) -> Self {
+        let Planned {
+            weights, passes, ..
+        } = planned;
+        let [irradiance, depth, profile_id, _] = views;
+        use wgpu::BindingResource::{Sampler, TextureView as Texture};
+        let group = |layout: &BindGroupLayout, entries: &[(u32, wgpu::BindingResource)]| {
+            let entries: Vec<_> = entries
+                .iter()
+                .map(|(binding, resource)| wgpu::BindGroupEntry {
+                    binding: *binding,
+                    resource: resource.clone(),
+                })
+                .collect();
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("subsurface"),
+                layout,
+                entries: &entries,
+            })
+        };
+        let levels = &scratch.levels;
+        let base = &levels[0];
+        let view = scratch.view.as_entire_binding();
+        let none = scratch_view(device, "subsurface nothing", [1, 1], LIGHT);
+        let blur = |draw: &Draw, l: usize| {
+            // The last level has none that is coarser; it does not look.
+            let (shape, mean) = match levels.get(l + 1) {
+                Some(next) => (&next.shape, scratch.mean(l + 1)),
+                None => (&levels[l].shape, &none),
+            };
+            let entries = [
+                (0, view.clone()),
+                (1, levels[l].settings.as_entire_binding()),
+                (2, levels[l].list.as_entire_binding()),
+                (3, weights.as_entire_binding()),
+                (7, Texture(&levels[l].light)),
+                (8, Texture(&levels[l].shape)),
+                (9, Texture(mean)),
+                (10, Texture(shape)),
+                (12, Sampler(linear)),
+            ];
+            group(&draw.layout, &entries)
+        };
+        let gather = |l: usize| {
+            let (marked, bends) = match l {
+                0 => (&scratch.marked, &scratch.bends),
+                _ => (&levels[l - 1].marked, &levels[l - 1].bends),
+            };
+            let entries = [
+                (5, levels[l].gathering.as_entire_binding()),
+                (6, marked.as_entire_binding()),
+                (7, levels[l].marked.as_entire_binding()),
+                (8, levels[l].draws.as_entire_binding()),
+                (9, levels[l].list.as_entire_binding()),
+                (10, bends.as_entire_binding()),
+                (11, levels[l].bends.as_entire_binding()),
+            ];
+            group(&passes.gather.layout, &entries)
+        };
+        let halve = |l: usize| {
+            let entries = [
+                (0, view.clone()),
+                (1, levels[l].settings.as_entire_binding()),
+                (2, levels[l].list.as_entire_binding()),
+                (7, Texture(&levels[l - 1].light)),
+                (8, Texture(&levels[l - 1].shape)),
+                (12, Sampler(linear)),
+            ];
+            group(&passes.halve[0].layout, &entries)
+        };
+        Self {
+            inputs: views.map(Clone::clone),
+            mark: group(
+                &passes.mark.layout,
+                &[
+                    (0, view.clone()),
+                    (1, Texture(depth)),
+                    (2, Texture(profile_id)),
+                    (3, weights.as_entire_binding()),
+                    (4, scratch.marked.as_entire_binding()),
+                ],
+            ),
+            gather: (0..levels.len()).map(gather).collect(),
+            pack: group(
+                &passes.pack[0].layout,
+                &[
+                    (0, view.clone()),
+                    (1, base.settings.as_entire_binding()),
+                    (2, base.list.as_entire_binding()),
+                    (4, Texture(irradiance)),
+                    (5, Texture(depth)),
+                    (6, Texture(profile_id)),
+                    (11, scratch.bends.as_entire_binding()),
+                ],
+            ),
+            halve: (1..levels.len()).map(halve).collect(),
+            level: (1..levels.len())
+                .map(|l| blur(&passes.level[0], l))
+                .collect(),
+            frame: blur(&passes.frame[0], 0),
+            copy: group(&passes.copy.layout, &[(4, Texture(irradiance))]),
+        }
+    }
+}

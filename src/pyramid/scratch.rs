@@ -1,0 +1,268 @@
+//! What a frame of one size needs, for one plan.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{UVec2, Vec2, Vec4};
+use wgpu::{Buffer, BufferUsages, Device, Queue, TextureView};
+
+use super::passes::{LIGHT, SHAPE};
+use crate::gaussian_sum::scratch_view;
+use crate::plan::{Plan, Shape, own_blur};
+
+/// Side of a tile, in pixels of its level.
+pub(super) const TILE: u32 = 16;
+
+/// `View` of the shaders.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(super) struct View {
+    pub origin: Vec4,
+    pub step: Vec4,
+    pub depth_to_mm: Vec4,
+    pub first_octave: f32,
+    pub rows: u32,
+    pub stride: u32,
+    pub profiles: u32,
+}
+
+/// `Blur` of surface.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Blur {
+    variance: f32,
+    own: f32,
+    limit: f32,
+    narrow: f32,
+    sharpness: Vec4,
+    slot: u32,
+    pad: [u32; 3],
+}
+
+/// `Level` of surface.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Level {
+    blurs: [Blur; 4],
+    size: Vec2,
+    scale: f32,
+    rest: u32,
+    coarser: u32,
+    pad: [u32; 3],
+}
+
+/// `Level` of tiles.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Gathering {
+    tiles: UVec2,
+    below: UVec2,
+    level: u32,
+    pad: u32,
+}
+
+/// Bytes of a `Draw` of tiles.wgsl; each list has two, of simple tiles and of the others.
+pub(super) const DRAW_BYTES: u64 = 16;
+
+pub(super) struct Scratch {
+    pub size: [u32; 2],
+    pub view: Buffer,
+    /// Of the frame's tiles, what they hold and where they bend.
+    pub marked: Buffer,
+    pub bends: Buffer,
+    pub levels: Vec<LevelScratch>,
+    /// Means of level 1 and of level 2, and by turns of those above.
+    pub means: [TextureView; 2],
+}
+
+pub(super) struct LevelScratch {
+    pub size: [u32; 2],
+    pub tiles: [u32; 2],
+    pub gathering: Buffer,
+    pub settings: Buffer,
+    pub light: TextureView,
+    pub shape: TextureView,
+    pub marked: Buffer,
+    pub bends: Buffer,
+    pub list: Buffer,
+    pub draws: Buffer,
+}
+
+impl Scratch {
+    pub fn new(device: &Device, queue: &Queue, size: [u32; 2], plan: &Plan) -> Self {
+        let uniform = |label: &str, size: usize| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: size as u64,
+                usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let words = |label: &str, count: u32, usage| {
+            device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size: 4 * u64::from(count),
+                usage: BufferUsages::STORAGE | usage,
+                mapped_at_creation: false,
+            })
+        };
+        // A level of one pixel has nothing above it.
+        let largest = size[0].max(size[1]);
+        let levels = plan
+            .levels
+            .min(largest.next_power_of_two().ilog2() as usize);
+        let size_of_level = |l: usize| size.map(|s| s.div_ceil(1 << l));
+        let tiles_of_frame = size.map(|s| s.div_ceil(TILE));
+        let frame_tiles = tiles_of_frame[0] * tiles_of_frame[1];
+        let mut below = tiles_of_frame;
+        let levels: Vec<_> = (0..=levels)
+            .map(|l| {
+                let size = size_of_level(l);
+                let tiles = size.map(|s| s.div_ceil(TILE));
+                let count = tiles[0] * tiles[1];
+                let level = LevelScratch {
+                    size,
+                    tiles,
+                    gathering: uniform("subsurface tiles of a level", size_of::<Gathering>()),
+                    settings: uniform("subsurface level", size_of::<Level>()),
+                    light: scratch_view(device, "subsurface light", size, LIGHT),
+                    shape: scratch_view(device, "subsurface shape", size, SHAPE),
+                    marked: words("subsurface marks", count, BufferUsages::empty()),
+                    bends: words("subsurface bends", count, BufferUsages::empty()),
+                    list: words("subsurface tiles", count, BufferUsages::empty()),
+                    draws: words(
+                        "subsurface draws",
+                        8,
+                        BufferUsages::INDIRECT | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
+                    ),
+                };
+                let draws = [6u32, 0, 0, 0, 6, 0, 0, 0];
+                queue.write_buffer(&level.draws, 0, bytemuck::bytes_of(&draws));
+                let gathering = Gathering {
+                    tiles: tiles.into(),
+                    below: below.into(),
+                    level: l as u32,
+                    pad: 0,
+                };
+                queue.write_buffer(&level.gathering, 0, bytemuck::bytes_of(&gathering));
+                let settings = level_settings(plan, l, levels, size);
+                queue.write_buffer(&level.settings, 0, bytemuck::bytes_of(&settings));
+                below = tiles;
+                level
+            })
+            .collect();
+        let mean = |l| scratch_view(device, "subsurface mean", size_of_level(l), LIGHT);
+        Self {
+            size,
+            view: uniform("subsurface view", size_of::<View>()),
+            marked: words("subsurface marks", frame_tiles, BufferUsages::empty()),
+            bends: words("subsurface bends", frame_tiles, BufferUsages::COPY_DST),
+            levels,
+            means: [mean(1), mean(2)],
+        }
+    }
+
+    /// Where the mean of level `l` goes, from 1 on.
+    pub fn mean(&self, l: usize) -> &TextureView {
+        &self.means[(l + 1) % 2]
+    }
+}
+
+fn level_settings(plan: &Plan, l: usize, levels: usize, size: [u32; 2]) -> Level {
+    let kinds = if l == 0 {
+        plan.kernels.fine
+    } else {
+        plan.kernels.coarse
+    };
+    let mut blurs = [Blur::zeroed(); 4];
+    for (j, kind) in kinds.blurs().enumerate() {
+        let square = kind.shape == Shape::Square;
+        blurs[if square { 3 } else { j }] = Blur {
+            variance: kind.variance_px2 as f32,
+            own: own_blur(l) as f32,
+            limit: kind.shape.limit() as f32,
+            narrow: kind.shape.narrow() as f32,
+            sharpness: Vec4::from_array(kind.shape.sharpness().map(|c| c as f32)),
+            slot: plan.slot(l, j) as u32,
+            pad: [0; 3],
+        };
+    }
+    Level {
+        blurs,
+        size: Vec2::new(size[0] as f32, size[1] as f32),
+        scale: (1 << l) as f32,
+        rest: plan.rest_slot(l) as u32,
+        coarser: u32::from(l < levels),
+        pad: [0; 3],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pyramid::passes::{BLUR, PACK, TILES};
+    use crate::wgsl::assert_layout;
+
+    #[test]
+    fn constants_are_those_of_the_shaders() {
+        let rows = crate::plan::ROWS_PER_OCTAVE;
+        for shader in [BLUR, TILES] {
+            assert!(shader.contains(&format!("const TILE = {TILE}u;")));
+            assert!(shader.contains(&format!("const ROWS_PER_OCTAVE = {rows:.1};")));
+        }
+        for shared in ["const FLAT_LEVELS = 3u;", "const RING = 4"] {
+            assert!(TILES.contains(shared) && PACK.contains(shared), "{shared}");
+        }
+    }
+
+    #[test]
+    fn structs_lie_as_the_shaders_have_them() {
+        assert_layout!(
+            BLUR,
+            "View",
+            View {
+                origin,
+                step,
+                depth_to_mm,
+                first_octave,
+                rows,
+                stride,
+                profiles
+            }
+        );
+        assert_layout!(
+            BLUR,
+            "Blur",
+            Blur {
+                variance,
+                own,
+                limit,
+                narrow,
+                sharpness,
+                slot
+            }
+        );
+        assert_layout!(
+            BLUR,
+            "Level",
+            Level {
+                blurs,
+                size,
+                scale,
+                rest,
+                coarser
+            }
+        );
+        assert_eq!(
+            crate::wgsl::layout(TILES, "View"),
+            crate::wgsl::layout(BLUR, "View")
+        );
+        assert_layout!(
+            TILES,
+            "Level",
+            Gathering {
+                tiles,
+                below,
+                level
+            }
+        );
+    }
+}
