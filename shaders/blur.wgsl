@@ -33,6 +33,9 @@ fn eigenvalues(m: vec3f) -> vec2f {
     return vec2f(middle + off, max(middle - off, 1e-4 * middle));
 }
 
+// Variance of the weights of a blur that hardly reaches the next pixel, in square pixels.
+const NARROWEST_WEIGHTS = 0.25;
+
 struct Scale {
     // mm² that a variance of one square pixel stands for.
     mm2: f32,
@@ -277,7 +280,8 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
             center.kii[j] = k.x;
             center.kij[j] = k.y;
             center.kjj[j] = k.z;
-            center.half[j] = 0.5 / (blur.variance * scale.mm2);
+            // Weights of single pixels are wider than what they spread by.
+            center.half[j] = 0.5 / (max(blur.variance, NARROWEST_WEIGHTS) * scale.mm2);
             colors[j] = weight_at(scale, blur.slot);
             wanted += colors[j];
         }

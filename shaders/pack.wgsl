@@ -7,7 +7,7 @@
 @group(0) @binding(11) var<storage, read_write> bends: array<atomic<u32>>;
 
 // Second differences of depth, over the mm of a pixel, up to which a level is flat.
-const FLAT = 0.05;
+const FLAT = 0.4;
 // Levels that may have flat tiles; as in tiles.wgsl.
 const FLAT_LEVELS = 3u;
 // Pixels that taps reach on flat tiles; as in tiles.wgsl.

@@ -54,7 +54,7 @@ override CAREFUL: bool = true;
 
 const TILE = 16u;
 // How far from the plane a pixel may lie to be of the same surface, in mm a pixel of the level.
-const TOLERANCE = 1.0;
+const TOLERANCE = 2.0;
 // A pixel that is hardly of any surface still is of one.
 const LEAST_AREA = 1e-3;
 

@@ -25,7 +25,7 @@ pub mod truth;
 mod wgsl;
 
 pub use error::Error;
-pub use plan::{Plan, Row};
+pub use plan::{DEFAULT_MAX_ERROR, Plan, Row};
 pub use planned::PlannedScreenSpace;
 pub use profile::{Gaussian, Profile};
 pub use screen_space::{ScreenFrame, ScreenSpace};

@@ -5,7 +5,7 @@ use wgpu::{CommandEncoder, Device, Queue, TextureFormat};
 
 use crate::pyramid::{Inputs, Optics, Pyramid};
 use crate::screen_space::{check, inverse_mm};
-use crate::{Error, Plan, ScreenFrame};
+use crate::{Error, Plan, ScreenFrame, ScreenSpace};
 
 /// Scattering in screen space by a [`Plan`]: the error that a host accepts, and no more work than that.
 ///
@@ -17,10 +17,14 @@ use crate::{Error, Plan, ScreenFrame};
 /// submission need an effect each, since the numbers of a frame are uploaded when it is prepared. A
 /// frame of the same size, textures and plan as the one before makes nothing anew.
 ///
-/// Scratch memory: 24.1 bytes a pixel.
+/// Scratch memory: 23.9 bytes a pixel; 80 where the plan is exact.
 pub struct PlannedScreenSpace {
     output_format: TextureFormat,
     pyramid: Pyramid,
+    /// Made for the first plan that needs it.
+    exact: Option<ScreenSpace>,
+    /// Whether the frame that was last prepared is its.
+    is_exact: bool,
 }
 
 impl PlannedScreenSpace {
@@ -33,6 +37,8 @@ impl PlannedScreenSpace {
         Ok(Self {
             output_format,
             pyramid: Pyramid::new(device, output_format),
+            exact: None,
+            is_exact: false,
         })
     }
 
@@ -56,6 +62,15 @@ impl PlannedScreenSpace {
                 format!("the {} of the frame", frame.profiles.len()),
             ));
         }
+        let Some(plan) = plan.weights() else {
+            let exact = match self.exact.take() {
+                Some(exact) => exact,
+                None => ScreenSpace::new(device, self.output_format)?,
+            };
+            self.exact.insert(exact).prepare(device, frame)?;
+            self.is_exact = true;
+            return Ok(());
+        };
         let optics = optics(frame)?;
         self.pyramid.prepare(
             device,
@@ -69,12 +84,16 @@ impl PlannedScreenSpace {
                 plan,
             },
         );
+        self.is_exact = false;
         Ok(())
     }
 
     /// Records the frame that was last prepared; nothing before the first.
     pub fn render(&self, encoder: &mut CommandEncoder) {
-        self.pyramid.render(encoder);
+        match &self.exact {
+            Some(exact) if self.is_exact => exact.render(encoder),
+            _ => self.pyramid.render(encoder),
+        }
     }
 }
 

@@ -85,7 +85,7 @@ impl ScreenMethod for Planned {
     }
 
     fn scratch_bytes_per_pixel(&self) -> f64 {
-        24.1
+        23.9
     }
 }
 

@@ -1,35 +1,43 @@
-//! The plan: how much of which blur makes a profile, at every scale, to a stated error.
+//! The plan: what work keeps a stated error.
 
 mod kernels;
 mod nnls;
 mod response;
+mod weights;
 
 use std::fmt;
 
-use glam::{DVec3, Vec3, Vec4};
+use glam::Vec3;
 
 use crate::{Error, Profile};
-pub(crate) use kernels::{KERNELS, Kernels, Kinds, Shape, own_blur};
-use response::Responses;
+use kernels::KERNELS;
+pub(crate) use kernels::{Kinds, Shape, own_blur};
+#[cfg(test)]
+pub(crate) use weights::ROWS_PER_OCTAVE;
+pub(crate) use weights::Weights;
 
-/// How a profile is scattered at a stated error: the weights of the blurs at every scale.
+/// The error that a result of eight bits a channel can show, in units of white.
+pub const DEFAULT_MAX_ERROR: f32 = 1.0 / 255.0;
+
+/// The largest error of the exact effect on edges that are soft by a pixel (`tests/screen_space.rs`).
+const EXACT_ERROR: f32 = 0.0005;
+
+/// How profiles are scattered at a stated error: which blurs, how much of each at every scale, or the
+/// exact effect where nothing less will do.
 ///
 /// It is made once for a set of profiles, not for each frame: fitting a profile takes a second, or
 /// several where `max_error` is small. Every blur is a
 /// Gaussian of a fixed width *in pixels*, those of a level twice as wide as those of the level
 /// before; what changes with the scale is how much of each is taken. The weights are fitted so that
-/// the largest error on straight edges is the least: edges soft by σ = 1 px against the closed form,
-/// hard ones along an axis of the pixels against the visible integral. Hard ones at other angles, layers
+/// the largest error on straight edges is the least, along the axes of the pixels, at 45° and at 27°:
+/// edges soft by σ = 1 px against the closed form, hard ones against the visible integral. Layers
 /// and detail of a pixel on steep slopes may be off by more (docs/method.md).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     max_error: f32,
-    pub(crate) kernels: Kernels,
-    /// Levels above the frame.
-    pub(crate) levels: usize,
-    first_octave: f64,
-    /// A profile's rows, at scales a sixth of an octave apart.
-    profiles: Vec<Vec<Row>>,
+    profiles: usize,
+    /// None: the exact effect.
+    weights: Option<Weights>,
 }
 
 /// What is done at one scale.
@@ -39,145 +47,59 @@ pub struct Row {
     pub px_per_mm: f32,
     /// Light that stays, then each blur of the frame, then each of level 1 and so on.
     pub weights: Vec<Vec3>,
-    /// The largest error on straight edges, up to the next row; in units of `white`.
+    /// The largest error on straight edges, up to the next row; in units of white.
     pub predicted_error: f32,
 }
 
-/// Rows to an octave of scale; between two of them weights are interpolated.
-pub(crate) const ROWS_PER_OCTAVE: f64 = 6.0;
-
-/// Levels that a plan may use: at the last, a pixel is 128 of the frame's.
-const MAX_LEVELS: usize = 7;
-
 impl Plan {
     /// The cheapest plan whose error on flat edges is at most `max_error`, in units of the radiance
-    /// that the host shows as white; ids count `profiles` from 1.
+    /// that the host shows as white ([`DEFAULT_MAX_ERROR`] where nobody knows better); ids count
+    /// `profiles` from 1.
     ///
     /// # Errors
     /// No profile, or more than [`MAX_PROFILES`](crate::MAX_PROFILES); a `max_error` that is not a
-    /// number above 0, or less than the best plan has.
+    /// number above 0, or less than the exact effect has.
     pub fn new(profiles: &[Profile], max_error: f32) -> Result<Self, Error> {
         crate::input::check_profiles(profiles)?;
-        if !max_error.is_finite() || max_error <= 0.0 {
+        if !max_error.is_finite() || max_error < EXACT_ERROR {
             return Err(Error::new(
                 "max_error",
                 max_error.to_string(),
-                "a finite number above 0",
+                format!("a finite number from {EXACT_ERROR} on"),
             ));
         }
-        let mut least = f32::INFINITY;
-        for kernels in KERNELS {
-            let plan = Self::of(profiles, max_error, kernels);
-            if plan.predicted_error() <= max_error {
-                return Ok(plan);
-            }
-            least = least.min(plan.predicted_error());
-        }
-        Err(Error::new(
-            "max_error",
-            max_error.to_string(),
-            format!("at least {least}; or the exact effect"),
-        ))
-    }
-
-    /// The plan of these kernels, whatever its error.
-    fn of(profiles: &[Profile], max_error: f32, kernels: Kernels) -> Self {
-        let responses = Responses::new(&kernels, MAX_LEVELS);
-        let widest = |p: &Profile| {
-            let variances = p.gaussians().iter().map(|g| f64::from(g.variance_mm2));
-            variances.fold(0.0, f64::max).sqrt()
-        };
-        let widest = profiles.iter().map(widest).fold(0.0, f64::max);
-        // From where the widest Gaussian is far below a pixel, to where the last level is as wide.
-        let (first, last) = if widest > 0.0 {
-            let last = f64::from(1 << MAX_LEVELS) / widest;
-            ((LEAST_PX / widest).log2(), last.log2())
-        } else {
-            (0.0, 0.0)
-        };
-        let rows = ((last - first) * ROWS_PER_OCTAVE).ceil() as usize + 2;
-        let fit = |profile: &Profile| {
-            let scale = |row: f64| f64::exp2(first + row / ROWS_PER_OCTAVE);
-            let mut fitted: Vec<Row> = (0..rows)
-                .map(|i| fit_row(&responses, &kernels, profile, scale(i as f64), max_error))
-                .collect();
-            for i in 0..rows - 1 {
-                let mean: Vec<Vec3> = fitted[i]
-                    .weights
-                    .iter()
-                    .zip(&fitted[i + 1].weights)
-                    .map(|(a, b)| (*a + *b) / 2.0)
-                    .collect();
-                let wanted = responses.wanted(profile, scale(i as f64 + 0.5));
-                let between = worst(&responses, &mean, &wanted);
-                let here = &mut fitted[i].predicted_error;
-                *here = here.max(between);
-            }
-            for i in 0..rows - 1 {
-                let next = fitted[i + 1].predicted_error;
-                fitted[i].predicted_error = fitted[i].predicted_error.max(next);
-            }
-            fitted
-        };
-        Self {
+        let mut fits = KERNELS.into_iter();
+        Ok(Self {
             max_error,
-            kernels,
-            levels: MAX_LEVELS,
-            first_octave: first,
-            profiles: profiles.iter().map(fit).collect(),
-        }
+            profiles: profiles.len(),
+            weights: fits.find_map(|kernels| Weights::new(profiles, max_error, kernels)),
+        })
     }
 
-    /// log₂ of the pixels per mm of the first row.
-    pub(crate) fn first_octave(&self) -> f32 {
-        self.first_octave as f32
+    /// The exact effect, whatever it takes.
+    ///
+    /// # Errors
+    /// No profile, or more than [`MAX_PROFILES`](crate::MAX_PROFILES).
+    pub fn exact(profiles: &[Profile]) -> Result<Self, Error> {
+        crate::input::check_profiles(profiles)?;
+        Ok(Self {
+            max_error: EXACT_ERROR,
+            profiles: profiles.len(),
+            weights: None,
+        })
     }
 
     pub(crate) fn profile_count(&self) -> usize {
-        self.profiles.len()
+        self.profiles
     }
 
-    pub(crate) fn row_count(&self) -> usize {
-        self.profiles[0].len()
+    pub(crate) fn weights(&self) -> Option<&Weights> {
+        self.weights.as_ref()
     }
 
-    /// Where blur `j` of level `l` is in a row of weights; the light that stays is at 0.
-    pub(crate) fn slot(&self, level: usize, j: usize) -> usize {
-        let Kernels { fine, coarse } = &self.kernels;
-        match level {
-            0 => 1 + j,
-            l => 1 + fine.len() + (l - 1) * coarse.len() + j,
-        }
-    }
-
-    /// Where the sum of the weights of all levels beyond `level` is.
-    pub(crate) fn rest_slot(&self, level: usize) -> usize {
-        self.slot(self.levels + 1, 0) + level
-    }
-
-    /// Vectors to a row of [`table`](Self::table).
-    pub(crate) fn stride(&self) -> usize {
-        self.rest_slot(self.levels) + 1
-    }
-
-    /// The weights as the shaders have them: of each profile the rows, of each row the slots, and in
-    /// the last component of its first one the highest level of all rows up to here.
-    pub(crate) fn table(&self) -> Vec<Vec4> {
-        let mut table = Vec::new();
-        for rows in &self.profiles {
-            let mut top = 0;
-            for row in rows {
-                let levels = 0..=self.levels;
-                let beyond = |l: usize| row.weights[self.slot(l + 1, 0)..].iter().sum::<Vec3>();
-                let rest: Vec<Vec3> = levels.map(beyond).collect();
-                top = top.max(rest.iter().take_while(|r| **r != Vec3::ZERO).count());
-                let weights = row.weights.iter().chain(&rest).map(|w| w.extend(0.0));
-                let first = table.len();
-                table.extend(weights);
-                table[first].w = top as f32;
-            }
-        }
-        table
+    /// Whether only the exact effect keeps the error.
+    pub fn is_exact(&self) -> bool {
+        self.weights.is_none()
     }
 
     /// The error that was asked for.
@@ -185,116 +107,20 @@ impl Plan {
         self.max_error
     }
 
-    /// The largest error on flat edges, of any profile at any scale.
+    /// The largest error on straight edges, of any profile at any scale.
     pub fn predicted_error(&self) -> f32 {
-        let rows = self.profiles.iter().flatten();
-        rows.map(|r| r.predicted_error).fold(0.0, f32::max)
+        let weights = self.weights.as_ref();
+        weights.map_or(EXACT_ERROR, Weights::predicted_error)
     }
 
     /// The rows of a profile, counted from 0, from the smallest scale to the largest; none of one
-    /// that the plan was not made for.
+    /// that the plan was not made for, or of the exact effect.
     pub fn rows(&self, profile: usize) -> &[Row] {
-        self.profiles.get(profile).map_or(&[], |rows| rows)
+        let weights = self.weights.as_ref();
+        weights
+            .and_then(|w| w.profiles.get(profile))
+            .map_or(&[], |rows| rows)
     }
-}
-
-/// σ of the widest Gaussian, in pixels, below which a profile does nothing worth a row.
-const LEAST_PX: f64 = 0.0625;
-
-/// The weights at one scale, without the squares that the error does not ask for.
-fn fit_row(
-    responses: &Responses,
-    kernels: &Kernels,
-    profile: &Profile,
-    px_per_mm: f64,
-    max_error: f32,
-) -> Row {
-    let wanted = responses.wanted(profile, px_per_mm);
-    let [fine, coarse] = [kernels.fine, kernels.coarse].map(|k| k.square_px2.is_some());
-    // From the cheapest on: a level has a quarter of the pixels of the one before.
-    let mut choices = vec![[false, false]];
-    choices.extend(coarse.then_some([false, true]));
-    choices.extend(fine.then_some([true, false]));
-    choices.extend((fine && coarse).then_some([true, true]));
-    let mut best: Option<Row> = None;
-    for squares in choices {
-        let row = fit_columns(responses, kernels, &wanted, squares, px_per_mm, max_error);
-        // Between two rows the error is a little larger than at either.
-        let enough = row.predicted_error <= 0.95 * max_error;
-        if best
-            .as_ref()
-            .is_none_or(|b| row.predicted_error < b.predicted_error)
-        {
-            best = Some(row);
-        }
-        if enough {
-            break;
-        }
-    }
-    best.expect("there is a choice without squares")
-}
-
-/// The weights with or without the square of the frame, and those of the levels.
-fn fit_columns(
-    responses: &Responses,
-    kernels: &Kernels,
-    wanted: &[Vec<f64>; 3],
-    [fine, coarse]: [bool; 2],
-    px_per_mm: f64,
-    max_error: f32,
-) -> Row {
-    let count = responses.columns[0].len();
-    let used: Vec<usize> = (0..count)
-        .filter(|i| {
-            let is_square = |kinds: &Kinds, j: usize| j == kinds.variances_px2.len();
-            match i.checked_sub(1) {
-                None => true,
-                Some(j) if j < kernels.fine.len() => fine || !is_square(&kernels.fine, j),
-                Some(j) => {
-                    let j = (j - kernels.fine.len()) % kernels.coarse.len();
-                    coarse || !is_square(&kernels.coarse, j)
-                }
-            }
-        })
-        .collect();
-    let columns: Vec<Vec<f64>> = responses
-        .columns
-        .iter()
-        .map(|row| used.iter().map(|i| row[*i]).collect())
-        .collect();
-    let mut weights = vec![Vec3::ZERO; count];
-    for (channel, wanted) in wanted.iter().enumerate() {
-        let fit = nnls::minimax(&columns, wanted).0;
-        for (i, weight) in used.iter().zip(fit) {
-            weights[*i][channel] = weight as f32;
-        }
-    }
-    // What changes nothing is not worth its taps: its light goes to the next narrower blur.
-    for pair in used.windows(2).rev() {
-        let too_small = weights[pair[1]].cmplt(Vec3::splat(0.05 * max_error));
-        let moved = Vec3::select(too_small, weights[pair[1]], Vec3::ZERO);
-        weights[pair[1]] -= moved;
-        weights[pair[0]] += moved;
-    }
-    Row {
-        px_per_mm: px_per_mm as f32,
-        predicted_error: worst(responses, &weights, wanted),
-        weights,
-    }
-}
-
-fn worst(responses: &Responses, weights: &[Vec3], wanted: &[Vec<f64>; 3]) -> f32 {
-    let mut worst = 0.0;
-    for (i, columns) in responses.columns.iter().enumerate() {
-        let found: DVec3 = columns
-            .iter()
-            .zip(weights)
-            .map(|(c, w)| w.as_dvec3() * *c)
-            .sum();
-        let wanted = DVec3::new(wanted[0][i], wanted[1][i], wanted[2][i]);
-        worst = (found - wanted).abs().max_element().max(worst);
-    }
-    worst as f32
 }
 
 impl fmt::Display for Plan {
@@ -305,10 +131,13 @@ impl fmt::Display for Plan {
             self.max_error,
             self.predicted_error()
         )?;
-        for (what, kinds) in [
-            ("the frame", self.kernels.fine),
-            ("each level", self.kernels.coarse),
-        ] {
+        let Some(Weights {
+            kernels, profiles, ..
+        }) = &self.weights
+        else {
+            return writeln!(f, "the exact effect");
+        };
+        for (what, kinds) in [("the frame", kernels.fine), ("each level", kernels.coarse)] {
             write!(f, "{what}:")?;
             for blur in kinds.blurs() {
                 let taps = blur.shape.count();
@@ -316,7 +145,7 @@ impl fmt::Display for Plan {
             }
             writeln!(f)?;
         }
-        for (rows, id) in self.profiles.iter().zip(1..) {
+        for (rows, id) in profiles.iter().zip(1..) {
             writeln!(f, "profile {id}:  px/mm   error    weights")?;
             for row in rows {
                 write!(f, "  {:14.4}  {:.5} ", row.px_per_mm, row.predicted_error)?;
@@ -337,11 +166,12 @@ mod tests {
 
     #[test]
     fn plans_keep_what_they_state() {
-        for max_error in [1.0 / 100.0, 1.0 / 255.0] {
+        for max_error in [1.0 / 100.0, 1.0 / 255.0, 1.0 / 1000.0] {
             let since = std::time::Instant::now();
             let plan = Plan::new(&[Profile::SKIN], max_error).unwrap();
             println!("{plan}{:?}", since.elapsed());
             assert!(plan.predicted_error() <= max_error);
+            assert_eq!(plan.is_exact(), max_error < 0.002);
         }
     }
 

@@ -85,15 +85,21 @@ pub(super) fn minimax(a: &[Vec<f64>], b: &[f64]) -> (Vec<f64>, f64) {
         let mut gram = vec![vec![SUM; n]; n];
         let mut rhs = vec![SUM; n];
         for ((row, b), w) in a.iter().zip(b).zip(&weights) {
-            if *w < 1e-8 {
+            // Most rows soon weigh nothing.
+            if *w < 1e-7 {
                 continue;
             }
             for i in 0..n {
                 let wi = w * row[i];
                 rhs[i] += wi * b;
-                for j in 0..n {
-                    gram[i][j] += wi * row[j];
+                for (g, r) in gram[i][..=i].iter_mut().zip(row) {
+                    *g += wi * r;
                 }
+            }
+        }
+        for i in 0..n {
+            for j in i + 1..n {
+                gram[i][j] = gram[j][i];
             }
         }
         let mut x = nnls(&gram, &rhs);

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 use libm::erfc;
 
-use super::Kernels;
+use super::kernels::Kernels;
 use super::kernels::Taps;
 use crate::Profile;
 

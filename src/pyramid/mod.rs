@@ -11,7 +11,7 @@ use wgpu::{
 };
 
 use crate::gaussian_sum::scratch_view;
-use crate::plan::Plan;
+use crate::plan::Weights;
 use passes::{Compute, Draw, LIGHT, Passes, Shaders, begin};
 use scratch::{DRAW_BYTES, LevelScratch, Scratch, View};
 
@@ -32,7 +32,7 @@ pub(crate) struct Inputs<'a> {
     pub profile_id: &'a TextureView,
     pub output: &'a TextureView,
     pub optics: Optics,
-    pub plan: &'a Plan,
+    pub plan: &'a Weights,
 }
 
 /// The passes, and what they need for the frame that was last prepared.
@@ -47,7 +47,7 @@ pub(crate) struct Pyramid {
 
 /// What follows from the plan.
 struct Planned {
-    plan: Plan,
+    plan: Weights,
     weights: Buffer,
     passes: Passes,
 }
@@ -110,7 +110,7 @@ impl Pyramid {
             first_octave: plan.first_octave(),
             rows: plan.row_count() as u32,
             stride: plan.stride() as u32,
-            profiles: plan.profile_count() as u32,
+            profiles: plan.profiles.len() as u32,
         };
         queue.write_buffer(&scratch.view, 0, bytemuck::bytes_of(&view));
         let views = [
@@ -216,7 +216,7 @@ fn over_tiles(
     }
 }
 
-fn weights(device: &Device, plan: &Plan) -> Buffer {
+fn weights(device: &Device, plan: &Weights) -> Buffer {
     use wgpu::util::DeviceExt;
     device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: Some("subsurface weights"),

@@ -5,7 +5,7 @@ use wgpu::{
     ShaderStages, TextureFormat, TextureSampleType, TextureView,
 };
 
-use crate::plan::{Kinds, Plan, Shape};
+use crate::plan::{Kinds, Shape, Weights};
 
 /// Format of light and of means: linear filters may read it.
 pub(super) const LIGHT: TextureFormat = TextureFormat::Rgba16Float;
@@ -65,7 +65,7 @@ pub(super) struct Passes {
 }
 
 impl Passes {
-    pub fn new(device: &Device, shaders: &Shaders, plan: &Plan, output: TextureFormat) -> Self {
+    pub fn new(device: &Device, shaders: &Shaders, plan: &Weights, output: TextureFormat) -> Self {
         let compute = |entry, bindings: &[u32]| {
             let entries: Vec<_> = bindings.iter().map(|b| tiles_entry(*b)).collect();
             Compute::new(device, &shaders.tiles, entry, &entries)

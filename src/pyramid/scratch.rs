@@ -6,7 +6,7 @@ use wgpu::{Buffer, BufferUsages, Device, Queue, TextureView};
 
 use super::passes::{LIGHT, SHAPE};
 use crate::gaussian_sum::scratch_view;
-use crate::plan::{Plan, Shape, own_blur};
+use crate::plan::{Shape, Weights, own_blur};
 
 /// Side of a tile, in pixels of its level.
 pub(super) const TILE: u32 = 16;
@@ -87,7 +87,7 @@ pub(super) struct LevelScratch {
 }
 
 impl Scratch {
-    pub fn new(device: &Device, queue: &Queue, size: [u32; 2], plan: &Plan) -> Self {
+    pub fn new(device: &Device, queue: &Queue, size: [u32; 2], plan: &Weights) -> Self {
         let uniform = |label: &str, size: usize| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -166,7 +166,7 @@ impl Scratch {
     }
 }
 
-fn level_settings(plan: &Plan, l: usize, levels: usize, size: [u32; 2]) -> Level {
+fn level_settings(plan: &Weights, l: usize, levels: usize, size: [u32; 2]) -> Level {
     let kinds = if l == 0 {
         plan.kernels.fine
     } else {

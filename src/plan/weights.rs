@@ -1,0 +1,208 @@
+//! How much of which blur makes a profile, at every scale.
+
+use glam::{DVec3, Vec3, Vec4};
+
+use super::Row;
+use super::kernels::Kernels;
+use super::nnls;
+use super::response::Responses;
+use crate::Profile;
+
+/// Rows to an octave of scale; between two of them weights are interpolated.
+pub(crate) const ROWS_PER_OCTAVE: f64 = 6.0;
+
+/// Levels that weights may be for: at the last, a pixel is 128 of the frame's.
+const MAX_LEVELS: usize = 7;
+
+/// The weights of the blurs of a pyramid.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Weights {
+    pub kernels: Kernels,
+    /// Levels above the frame.
+    pub levels: usize,
+    first_octave: f64,
+    /// A profile's rows, at scales a sixth of an octave apart.
+    pub profiles: Vec<Vec<Row>>,
+}
+
+impl Weights {
+    /// Those of these kernels whose error is the least; `None` where it is more than `max_error`.
+    pub fn new(profiles: &[Profile], max_error: f32, kernels: Kernels) -> Option<Self> {
+        let responses = Responses::new(&kernels, MAX_LEVELS);
+        let widest = |p: &Profile| {
+            let variances = p.gaussians().iter().map(|g| f64::from(g.variance_mm2));
+            variances.fold(0.0, f64::max).sqrt()
+        };
+        let widest = profiles.iter().map(widest).fold(0.0, f64::max);
+        // From where the widest Gaussian is far below a pixel, to where the last level is as wide.
+        let (first, last) = if widest > 0.0 {
+            let last = f64::from(1 << MAX_LEVELS) / widest;
+            ((LEAST_PX / widest).log2(), last.log2())
+        } else {
+            (0.0, 0.0)
+        };
+        let rows = ((last - first) * ROWS_PER_OCTAVE).ceil() as usize + 2;
+        let fit = |profile: &Profile| {
+            let scale = |row: f64| f64::exp2(first + row / ROWS_PER_OCTAVE);
+            let mut fitted = Vec::new();
+            for i in 0..rows {
+                let row = fit_row(&responses, &kernels, profile, scale(i as f64), max_error);
+                if row.predicted_error > max_error {
+                    return None;
+                }
+                fitted.push(row);
+            }
+            for i in 0..rows - 1 {
+                let mean: Vec<Vec3> = fitted[i]
+                    .weights
+                    .iter()
+                    .zip(&fitted[i + 1].weights)
+                    .map(|(a, b)| (*a + *b) / 2.0)
+                    .collect();
+                let wanted = responses.wanted(profile, scale(i as f64 + 0.5));
+                let between = worst(&responses, &mean, &wanted);
+                let here = &mut fitted[i].predicted_error;
+                *here = here.max(between);
+            }
+            for i in 0..rows - 1 {
+                let next = fitted[i + 1].predicted_error;
+                fitted[i].predicted_error = fitted[i].predicted_error.max(next);
+            }
+            Some(fitted)
+        };
+        let weights = Self {
+            kernels,
+            levels: MAX_LEVELS,
+            first_octave: first,
+            profiles: profiles.iter().map(fit).collect::<Option<_>>()?,
+        };
+        (weights.predicted_error() <= max_error).then_some(weights)
+    }
+
+    /// log₂ of the pixels per mm of the first row.
+    pub fn first_octave(&self) -> f32 {
+        self.first_octave as f32
+    }
+
+    pub fn row_count(&self) -> usize {
+        self.profiles[0].len()
+    }
+
+    /// Where blur `j` of level `l` is in a row of weights; the light that stays is at 0.
+    pub fn slot(&self, level: usize, j: usize) -> usize {
+        let Kernels { fine, coarse } = &self.kernels;
+        match level {
+            0 => 1 + j,
+            l => 1 + fine.len() + (l - 1) * coarse.len() + j,
+        }
+    }
+
+    /// Where the sum of the weights of all levels beyond `level` is.
+    pub fn rest_slot(&self, level: usize) -> usize {
+        self.slot(self.levels + 1, 0) + level
+    }
+
+    /// Vectors to a row of [`table`](Self::table).
+    pub fn stride(&self) -> usize {
+        self.rest_slot(self.levels) + 1
+    }
+
+    /// The weights as the shaders have them: of each profile the rows, of each row the slots, and in
+    /// the last component of its first one the highest level of all rows up to here.
+    pub fn table(&self) -> Vec<Vec4> {
+        let mut table = Vec::new();
+        for rows in &self.profiles {
+            let mut top = 0;
+            for row in rows {
+                let levels = 0..=self.levels;
+                let beyond = |l: usize| row.weights[self.slot(l + 1, 0)..].iter().sum::<Vec3>();
+                let rest: Vec<Vec3> = levels.map(beyond).collect();
+                top = top.max(rest.iter().take_while(|r| **r != Vec3::ZERO).count());
+                let weights = row.weights.iter().chain(&rest).map(|w| w.extend(0.0));
+                let first = table.len();
+                table.extend(weights);
+                table[first].w = top as f32;
+            }
+        }
+        table
+    }
+
+    /// The largest error on straight edges, of any profile at any scale.
+    pub fn predicted_error(&self) -> f32 {
+        let rows = self.profiles.iter().flatten();
+        rows.map(|r| r.predicted_error).fold(0.0, f32::max)
+    }
+}
+
+/// σ of the widest Gaussian, in pixels, below which a profile does nothing worth a row.
+const LEAST_PX: f64 = 0.0625;
+
+/// The weights at one scale, without the square of the frame where the error does not ask for it.
+fn fit_row(
+    responses: &Responses,
+    kernels: &Kernels,
+    profile: &Profile,
+    px_per_mm: f64,
+    max_error: f32,
+) -> Row {
+    let wanted = responses.wanted(profile, px_per_mm);
+    let all: Vec<usize> = (0..responses.columns[0].len()).collect();
+    if kernels.fine.square_px2.is_some() {
+        let mut without = all.clone();
+        without.remove(kernels.fine.len());
+        let row = fit_columns(responses, &without, &wanted, px_per_mm, max_error);
+        // Between two rows the error is a little larger than at either.
+        if row.predicted_error <= 0.95 * max_error {
+            return row;
+        }
+    }
+    fit_columns(responses, &all, &wanted, px_per_mm, max_error)
+}
+
+/// The weights of some of the columns; the others have none.
+fn fit_columns(
+    responses: &Responses,
+    used: &[usize],
+    wanted: &[Vec<f64>; 3],
+    px_per_mm: f64,
+    max_error: f32,
+) -> Row {
+    let columns: Vec<Vec<f64>> = responses
+        .columns
+        .iter()
+        .map(|row| used.iter().map(|i| row[*i]).collect())
+        .collect();
+    let mut weights = vec![Vec3::ZERO; responses.columns[0].len()];
+    for (channel, wanted) in wanted.iter().enumerate() {
+        let fit = nnls::minimax(&columns, wanted).0;
+        for (i, weight) in used.iter().zip(fit) {
+            weights[*i][channel] = weight as f32;
+        }
+    }
+    // What changes nothing is not worth its taps: its light goes to the next narrower blur.
+    for pair in used.windows(2).rev() {
+        let too_small = weights[pair[1]].cmplt(Vec3::splat(0.05 * max_error));
+        let moved = Vec3::select(too_small, weights[pair[1]], Vec3::ZERO);
+        weights[pair[1]] -= moved;
+        weights[pair[0]] += moved;
+    }
+    Row {
+        px_per_mm: px_per_mm as f32,
+        predicted_error: worst(responses, &weights, wanted),
+        weights,
+    }
+}
+
+fn worst(responses: &Responses, weights: &[Vec3], wanted: &[Vec<f64>; 3]) -> f32 {
+    let mut worst = 0.0;
+    for (i, columns) in responses.columns.iter().enumerate() {
+        let found: DVec3 = columns
+            .iter()
+            .zip(weights)
+            .map(|(c, w)| w.as_dvec3() * *c)
+            .sum();
+        let wanted = DVec3::new(wanted[0][i], wanted[1][i], wanted[2][i]);
+        worst = (found - wanted).abs().max_element().max(worst);
+    }
+    worst as f32
+}
