@@ -71,8 +71,14 @@ fn mark(
             // A slope is blurred at finer levels than a surface that faces the camera.
             let row = ceil((-log2(max(mm.x, mm.y)) - view.first_octave) * ROWS_PER_OCTAVE);
             let i = u32(clamp(row, 0.0, f32(view.rows - 1u)));
-            atomicMax(&top, 1u + u32(weights[((id - 1u) * view.rows + i) * view.stride].w));
-            atomicMax(&largest_id, id);
+            // Most pixels of a tile say the same, and a load is cheaper.
+            let needs = 1u + u32(weights[((id - 1u) * view.rows + i) * view.stride].w);
+            if needs > atomicLoad(&top) {
+                atomicMax(&top, needs);
+            }
+            if id > atomicLoad(&largest_id) {
+                atomicMax(&largest_id, id);
+            }
         }
     }
     workgroupBarrier();
