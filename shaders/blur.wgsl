@@ -33,6 +33,8 @@ fn eigenvalues(m: vec3f) -> vec2f {
     return vec2f(middle + off, max(middle - off, 1e-4 * middle));
 }
 
+// Pixels to a step along the contour of a slope: more would miss what lies between.
+const LONGEST_STEP = 4.0;
 // Variance of the weights of a blur that hardly reaches the next pixel, in square pixels.
 const NARROWEST_WEIGHTS = 0.25;
 
@@ -61,7 +63,7 @@ fn scale_of(m: vec3f, id: u32) -> Scale {
         let a = vec2f(-m.y, m.x - lambda.y);
         let b = vec2f(m.z - lambda.y, -m.y);
         let along = normalize(select(a, b, dot(b, b) > dot(a, a)));
-        u = vec2i(round(min(1.3 * further, 16.0) * along));
+        u = vec2i(round(min(1.3 * further, LONGEST_STEP) * along));
         v = select(vec2i(1, 0), vec2i(0, 1), abs(u.x) >= abs(u.y));
     }
     let octave = -0.5 * log2(mm2) + log2(level.scale);
@@ -114,8 +116,11 @@ struct Center {
     to_ray_v: vec2f,
     ray2: f32,
     last: vec2i,
-    // Of each blur, 1/2v in mm, and half the inverse covariance over i and j: of i², ij and j².
+    // Of each blur, 1/2v in mm.
     half: vec4f,
+    // Of each blur, how many times more its square is with what the pyramid blurs by itself, less 1.
+    untold: vec4f,
+    // Of each blur, half the inverse covariance over i and j: of i², ij and j².
     kii: vec4f,
     kij: vec4f,
     kjj: vec4f,
@@ -176,8 +181,12 @@ fn tap(i: i32, j: i32, weights: vec4f) {
     let on_ray = f32(i) * center.to_ray_u + f32(j) * center.to_ray_v;
     let off = bitcast<f32>(there.y) - center.plane.z - on_ray.y;
     let bend = off * (2.0 * on_ray.x + off * center.ray2);
-    // Less than on the plane is as much as the tap is off; no weight grows beyond the middle's.
-    let nearness = exp(min(-bend * center.half, -log(max(weights, vec4f(1e-20)))));
+    // What the pyramid blurs by itself knows no distance off the plane, which on a bent surface grows as
+    // that on it to the fourth: taps make up for it. At a step in depth there is nothing to make up for.
+    let off_plane = bend * center.half;
+    let bent = off_plane * (1.0 + center.untold / (1.0 + 2.0 * abs(off_plane)));
+    // No weight grows beyond the middle's.
+    let nearness = exp(min(-bent, -log(max(weights, vec4f(1e-20)))));
     let k = e.a * (center.colors * (weights * nearness));
     light += k * e.rgb;
     mass += k;
@@ -280,6 +289,8 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
             center.kii[j] = k.x;
             center.kij[j] = k.y;
             center.kjj[j] = k.z;
+            let told = 1.0 - blur.own / blur.variance;
+            center.untold[j] = 1.0 / (told * told) - 1.0;
             // Weights of single pixels are wider than what they spread by.
             center.half[j] = 0.5 / (max(blur.variance, NARROWEST_WEIGHTS) * scale.mm2);
             colors[j] = weight_at(scale, blur.slot);

@@ -88,6 +88,11 @@ impl PlannedScreenSpace {
         Ok(())
     }
 
+    #[cfg(all(test, feature = "renderer"))]
+    pub(crate) fn pyramid(&self) -> &Pyramid {
+        &self.pyramid
+    }
+
     /// Records the frame that was last prepared; nothing before the first.
     pub fn render(&self, encoder: &mut CommandEncoder) {
         match &self.exact {

@@ -336,3 +336,77 @@ impl Frame {
         }
     }
 }
+
+#[cfg(all(test, feature = "renderer"))]
+mod tests {
+    use super::*;
+    use crate::renderer::Gpu;
+    use crate::{Plan, PlannedScreenSpace, Profile, ScreenFrame};
+
+    /// Tiles that are drawn of each level: simple ones, and others.
+    fn drawn(gpu: &Gpu, pyramid: &Pyramid) -> Vec<[u32; 2]> {
+        let levels = &pyramid.scratch.as_ref().unwrap().levels;
+        let counts = levels.iter().map(|level| {
+            let copy = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: None,
+                size: 2 * DRAW_BYTES,
+                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+                mapped_at_creation: false,
+            });
+            gpu.run(|encoder| {
+                encoder.copy_buffer_to_buffer(&level.draws, 0, &copy, 0, 2 * DRAW_BYTES);
+            });
+            copy.map_async(wgpu::MapMode::Read, .., |result| result.unwrap());
+            gpu.device
+                .poll(wgpu::PollType::wait_indefinitely())
+                .unwrap();
+            let bytes = copy.get_mapped_range(..).unwrap();
+            let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
+            [words[1], words[5]]
+        });
+        counts.collect()
+    }
+
+    #[test]
+    fn tiles_are_drawn_where_there_is_skin() {
+        let gpu = Gpu::headless().unwrap();
+        let format = TextureFormat::Rgba16Float;
+        let size = [160, 96];
+        let count = (size[0] * size[1]) as usize;
+        let light = gpu.upload(
+            "irradiance",
+            size,
+            TextureFormat::Rgba32Float,
+            &vec![[0.5f32; 4]; count],
+        );
+        let depth = gpu.upload("depth", size, TextureFormat::R32Float, &vec![0.5f32; count]);
+        let output = gpu.target("output", size, format);
+        let mut effect = PlannedScreenSpace::new(&gpu.device, format).unwrap();
+        let plan = Plan::new(&[Profile::SKIN], 0.01).unwrap();
+        let mut drawn_for = |id: u8| {
+            let frame = ScreenFrame {
+                irradiance: &light,
+                depth: &depth,
+                profile_id: &gpu.upload("id", size, TextureFormat::R8Uint, &vec![id; count]),
+                output: &output,
+                // A facing plane, 4 pixels a millimetre.
+                projection: glam::Mat4::from_diagonal(glam::Vec4::new(
+                    8.0 / size[0] as f32,
+                    8.0 / size[1] as f32,
+                    -0.001,
+                    1.0,
+                )),
+                mm_per_unit: 1.0,
+                profiles: &[Profile::SKIN],
+            };
+            effect
+                .prepare(&gpu.device, &gpu.queue, &frame, &plan)
+                .unwrap();
+            gpu.run(|encoder| effect.render(encoder));
+            drawn(&gpu, effect.pyramid())
+        };
+        assert!(drawn_for(0).iter().all(|tiles| *tiles == [0, 0]));
+        // Those at the border see what is beyond it.
+        assert_eq!(drawn_for(1)[0], [8 * 4, 10 * 6 - 8 * 4]);
+    }
+}
