@@ -79,9 +79,9 @@ impl ScreenMethod for Planned {
         self.effect.render(encoder);
     }
 
-    /// Each pixel has its own, by its scale and slope.
-    fn fetches(&self, _px_per_mm: f64) -> Option<f64> {
-        None
+    /// Of a pixel on a simple tile; the others read where each tap lies, too.
+    fn fetches(&self, px_per_mm: f64) -> Option<f64> {
+        self.plan.fetches(0, px_per_mm as f32).map(f64::from)
     }
 
     fn scratch_bytes_per_pixel(&self) -> f64 {

@@ -113,6 +113,14 @@ impl Plan {
         weights.map_or(EXACT_ERROR, Weights::predicted_error)
     }
 
+    /// Texel fetches for a pixel of skin of a profile, counted from 0, on flat skin that faces the camera;
+    /// `None` for the exact effect, and for a profile that the plan was not made for.
+    pub fn fetches(&self, profile: usize, px_per_mm: f32) -> Option<f32> {
+        let weights = self.weights.as_ref()?;
+        let rows = weights.profiles.get(profile)?;
+        (px_per_mm > 0.0).then(|| weights.fetches(rows, px_per_mm))
+    }
+
     /// The rows of a profile, counted from 0, from the smallest scale to the largest; none of one
     /// that the plan was not made for, or of the exact effect.
     pub fn rows(&self, profile: usize) -> &[Row] {

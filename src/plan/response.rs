@@ -27,7 +27,7 @@ struct Edge {
 const SHIFTS: [f64; 10] = [0.0, 0.4, 1.0, 2.0, 3.0, 6.3, 13.0, 27.6, 54.0, 105.0];
 /// At 45° and 27°.
 const OBLIQUE: [[i32; 2]; 2] = [[1, 1], [2, 1]];
-const OBLIQUE_SHIFTS: [f64; 3] = [0.3, 2.0, 13.0];
+const OBLIQUE_SHIFTS: [f64; 3] = [0.3, 2.9, 13.0];
 
 /// Edges, where they are looked at, and what each kernel makes of them there.
 pub(super) struct Responses {
