@@ -97,9 +97,10 @@ pub(super) fn minimax(a: &[Vec<f64>], b: &[f64]) -> (Vec<f64>, f64) {
                 }
             }
         }
-        for i in 0..n {
-            for j in i + 1..n {
-                gram[i][j] = gram[j][i];
+        let lower = gram.clone();
+        for (i, row) in gram.iter_mut().enumerate() {
+            for (j, g) in row.iter_mut().enumerate().skip(i + 1) {
+                *g = lower[j][i];
             }
         }
         let mut x = nnls(&gram, &rhs);
