@@ -311,10 +311,10 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
         light_here = wanted * light / max(mass, vec3f(1e-20));
     }
     let own = select(e, light_here / max(wanted, vec3f(1e-6)), wanted > vec3f(1e-3));
-    if level.coarser == 0u {
+    let rest = weight_at(scale, level.rest);
+    if level.coarser == 0u || all(rest <= vec3f(0.0)) {
         return Gathered(light_here, wanted, own);
     }
-    let rest = weight_at(scale, level.rest);
     // On no surface of the coarser level this level's own light stands in for it.
     let coarser = coarser_at(pixel);
     return Gathered(light_here + rest * select(own, coarser.rgb, coarser.a >= 0.0), wanted + rest, own);

@@ -26,7 +26,7 @@ fn fs_halve(@builtin(position) at: vec4f) -> Surface {
     let a = unpacked(textureLoad(finer_shape, 2 * pixel, 0).rg);
     let b = unpacked(textureLoad(finer_shape, 2 * pixel + 1, 0).rg);
     let shape = Shape(a.id, 0.5 * (a.z + b.z), 0.5 * (a.tangent + b.tangent));
-    return Surface(half_floats(vec4f(light.rgb / light.a, light.a)), packed(shape));
+    return Surface(half_floats(vec4f(light.rgb / max(light.a, LEAST_AREA), light.a)), packed(shape));
 }
 
 // The surface is that of the nearest of the four pixels that this one covers.

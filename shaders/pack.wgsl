@@ -11,7 +11,7 @@ const FLAT = 0.4;
 // Levels that may have flat tiles; as in tiles.wgsl.
 const FLAT_LEVELS = 3u;
 // Pixels that taps reach on flat tiles; as in tiles.wgsl.
-const RING = 4;
+const RING = 8;
 
 fn z_at(pixel: vec2i) -> f32 {
     let d = textureLoad(depth, pixel, 0).r;

@@ -15,7 +15,7 @@ struct View {
 // Side of a tile in pixels of its level.
 const TILE = 16u;
 // Pixels that taps reach on flat tiles.
-const RING = 4u;
+const RING = 8u;
 // Levels that may have flat tiles.
 const FLAT_LEVELS = 3u;
 const ROWS_PER_OCTAVE = 6.0;
@@ -68,8 +68,9 @@ fn mark(
             id = 0u;
         } else {
             let mm = abs(view.step.xy * z + view.step.zw);
-            // A slope is blurred at finer levels than a surface that faces the camera.
-            let row = ceil((-log2(max(mm.x, mm.y)) - view.first_octave) * ROWS_PER_OCTAVE);
+            // A slope is blurred at finer levels than a surface that faces the camera; what is narrower
+            // across a ray, or in a pixel that is not square, by less than two rows at coarser ones.
+            let row = ceil((-log2(max(mm.x, mm.y)) - view.first_octave) * ROWS_PER_OCTAVE) + 2.0;
             let i = u32(clamp(row, 0.0, f32(view.rows - 1u)));
             // Most pixels of a tile say the same, and a load is cheaper.
             let needs = 1u + u32(weights[((id - 1u) * view.rows + i) * view.stride].w);

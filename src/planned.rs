@@ -13,7 +13,9 @@ use crate::{Error, Plan, ScreenFrame, ScreenSpace};
 /// heads it is measured (docs/results.md), and where layers lie within millimetres of each other, at
 /// silhouettes and on steep slopes under detail of a pixel it is larger: there, use the exact effect.
 ///
-/// Everything runs over the tiles that hold skin alone, which the GPU finds. Views that share a
+/// Blurs run over the tiles that hold skin and their neighbours alone, which the GPU finds; marking,
+/// clearing and the copy of what does not scatter go over the frame. Between passes light is half
+/// floats, and held at their largest, 65504. The projection is right-handed. Views that share a
 /// submission need an effect each, since the numbers of a frame are uploaded when it is prepared. A
 /// frame of the same size, textures and plan as the one before makes nothing anew.
 ///
@@ -21,24 +23,34 @@ use crate::{Error, Plan, ScreenFrame, ScreenSpace};
 pub struct PlannedScreenSpace {
     output_format: TextureFormat,
     pyramid: Pyramid,
-    /// Made for the first plan that needs it.
+    /// Only while the plan is exact.
     exact: Option<ScreenSpace>,
-    /// Whether the frame that was last prepared is its.
-    is_exact: bool,
 }
 
 impl PlannedScreenSpace {
     /// The effect for outputs of `output_format`.
     ///
     /// # Errors
-    /// A format that cannot be rendered to on this device.
+    /// A format that cannot be rendered to on this device; a device with less than WebGPU's default
+    /// limits.
     pub fn new(device: &Device, output_format: TextureFormat) -> Result<Self, Error> {
         crate::input::check_output_format(device, output_format)?;
+        let limits = device.limits();
+        let (buffers, threads) = (
+            limits.max_storage_buffers_per_shader_stage,
+            limits.max_compute_invocations_per_workgroup,
+        );
+        if buffers < 6 || threads < 256 {
+            return Err(Error::new(
+                "device: limits",
+                format!("{buffers} storage buffers a stage, {threads} threads a workgroup"),
+                "6 and 256; WebGPU's defaults are 8 and 256",
+            ));
+        }
         Ok(Self {
             output_format,
             pyramid: Pyramid::new(device, output_format),
             exact: None,
-            is_exact: false,
         })
     }
 
@@ -55,20 +67,23 @@ impl PlannedScreenSpace {
         plan: &Plan,
     ) -> Result<(), Error> {
         check(frame, self.output_format)?;
-        if plan.profile_count() != frame.profiles.len() {
+        if plan.profiles() != frame.profiles {
             return Err(Error::new(
                 "plan",
-                format!("{} profiles", plan.profile_count()),
-                format!("the {} of the frame", frame.profiles.len()),
+                format!("a plan for other profiles ({})", plan.profiles().len()),
+                format!("one for the {} of the frame", frame.profiles.len()),
             ));
         }
         let Some(plan) = plan.weights() else {
-            let exact = match self.exact.take() {
-                Some(exact) => exact,
-                None => ScreenSpace::new(device, self.output_format)?,
-            };
-            self.exact.insert(exact).prepare(device, frame)?;
-            self.is_exact = true;
+            match &mut self.exact {
+                Some(exact) => exact.prepare(device, frame)?,
+                None => {
+                    let mut exact = ScreenSpace::new(device, self.output_format)?;
+                    exact.prepare(device, frame)?;
+                    self.exact = Some(exact);
+                    self.pyramid.forget();
+                }
+            }
             return Ok(());
         };
         let optics = optics(frame)?;
@@ -84,7 +99,7 @@ impl PlannedScreenSpace {
                 plan,
             },
         );
-        self.is_exact = false;
+        self.exact = None;
         Ok(())
     }
 
@@ -96,8 +111,8 @@ impl PlannedScreenSpace {
     /// Records the frame that was last prepared; nothing before the first.
     pub fn render(&self, encoder: &mut CommandEncoder) {
         match &self.exact {
-            Some(exact) if self.is_exact => exact.render(encoder),
-            _ => self.pyramid.render(encoder),
+            Some(exact) => exact.render(encoder),
+            None => self.pyramid.render(encoder),
         }
     }
 }

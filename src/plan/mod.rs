@@ -30,12 +30,13 @@ const EXACT_ERROR: f32 = 0.0005;
 /// Gaussian of a fixed width *in pixels*, those of a level twice as wide as those of the level
 /// before; what changes with the scale is how much of each is taken. The weights are fitted so that
 /// the largest error on straight edges is the least, along the axes of the pixels, at 45° and at 27°:
-/// edges soft by σ = 1 px against the closed form, hard ones against the visible integral. Layers
-/// and detail of a pixel on steep slopes may be off by more (docs/method.md).
+/// edges soft by σ = 1 px against the closed form, hard ones against the visible integral. It holds up
+/// to the px/mm of the last of [`rows`](Self::rows), where a profile is as wide as the last level; beyond,
+/// blurs stay as wide as there. Layers and detail of a pixel on steep slopes may be off by more (docs/method.md).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     max_error: f32,
-    profiles: usize,
+    profiles: Vec<Profile>,
     /// None: the exact effect.
     weights: Option<Weights>,
 }
@@ -71,7 +72,7 @@ impl Plan {
         let mut fits = KERNELS.into_iter();
         Ok(Self {
             max_error,
-            profiles: profiles.len(),
+            profiles: profiles.to_vec(),
             weights: fits.find_map(|kernels| Weights::new(profiles, max_error, kernels)),
         })
     }
@@ -84,13 +85,14 @@ impl Plan {
         crate::input::check_profiles(profiles)?;
         Ok(Self {
             max_error: EXACT_ERROR,
-            profiles: profiles.len(),
+            profiles: profiles.to_vec(),
             weights: None,
         })
     }
 
-    pub(crate) fn profile_count(&self) -> usize {
-        self.profiles
+    /// What it was made for.
+    pub fn profiles(&self) -> &[Profile] {
+        &self.profiles
     }
 
     pub(crate) fn weights(&self) -> Option<&Weights> {

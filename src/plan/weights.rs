@@ -33,10 +33,15 @@ impl Weights {
             let variances = p.gaussians().iter().map(|g| f64::from(g.variance_mm2));
             variances.fold(0.0, f64::max).sqrt()
         };
-        let widest = profiles.iter().map(widest).fold(0.0, f64::max);
-        // From where the widest Gaussian is far below a pixel, to where the last level is as wide.
+        let widths = || profiles.iter().map(widest).filter(|w| *w > 0.0);
+        let (widest, narrowest) = (
+            widths().fold(0.0, f64::max),
+            widths().fold(f64::MAX, f64::min),
+        );
+        // From where the widest Gaussian of all is far below a pixel, to where the last level is as wide
+        // as that of any profile.
         let (first, last) = if widest > 0.0 {
-            let last = f64::from(1 << MAX_LEVELS) / widest;
+            let last = f64::from(1 << MAX_LEVELS) / narrowest;
             ((LEAST_PX / widest).log2(), last.log2())
         } else {
             (0.0, 0.0)

@@ -125,6 +125,12 @@ impl Pyramid {
         }
     }
 
+    /// Gives back what the frame that was last prepared needs.
+    pub fn forget(&mut self) {
+        self.frame = None;
+        self.scratch = None;
+    }
+
     pub fn render(&self, encoder: &mut CommandEncoder) {
         let (Some(planned), Some(scratch), Some(frame)) =
             (&self.planned, &self.scratch, &self.frame)
@@ -150,7 +156,7 @@ impl Pyramid {
         }
         {
             let targets = [&base.light, &base.shape];
-            let mut pass = begin(encoder, "subsurface pack", &targets, true);
+            let mut pass = begin(encoder, "subsurface pack", &targets);
             over_tiles(&mut pass, passes.pack.each_ref(), &frame.pack, base);
         }
         forget_tiles(encoder, base);
@@ -162,19 +168,18 @@ impl Pyramid {
         }
         for (group, level) in frame.halve.iter().zip(coarser) {
             let targets = [&level.light, &level.shape];
-            let mut pass = begin(encoder, "subsurface halve", &targets, true);
+            let mut pass = begin(encoder, "subsurface halve", &targets);
             over_tiles(&mut pass, passes.halve.each_ref(), group, level);
         }
         for l in (1..scratch.levels.len()).rev() {
             let (group, level) = (&frame.level[l - 1], &scratch.levels[l]);
-            // Means are read where this level has a surface, and there they are drawn.
-            let mut pass = begin(encoder, "subsurface level", &[scratch.mean(l)], false);
+            let mut pass = begin(encoder, "subsurface level", &[scratch.mean(l)]);
             let [x, y] = level.size.map(|s| s as f32);
             pass.set_viewport(0.0, 0.0, x, y, 0.0, 1.0);
             over_tiles(&mut pass, passes.level.each_ref(), group, level);
         }
         let output = &frame.inputs[3];
-        let mut pass = begin(encoder, "subsurface frame", &[output], true);
+        let mut pass = begin(encoder, "subsurface frame", &[output]);
         pass.set_pipeline(&passes.copy.pipeline);
         pass.set_bind_group(0, &frame.copy, &[]);
         pass.draw(0..3, 0..1);

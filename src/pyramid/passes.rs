@@ -297,25 +297,19 @@ impl Draw {
     }
 }
 
-/// Begins a pass that leaves what it does not draw as it is, or clears it.
+/// Begins a pass over cleared targets: what lies outside of the tiles is no surface, and dark.
 pub(super) fn begin<'a>(
     encoder: &'a mut wgpu::CommandEncoder,
     label: &str,
     targets: &[&TextureView],
-    clear: bool,
 ) -> wgpu::RenderPass<'a> {
-    let load = if clear {
-        wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT)
-    } else {
-        wgpu::LoadOp::Load
-    };
     let attachment = |view| {
         Some(wgpu::RenderPassColorAttachment {
             view,
             depth_slice: None,
             resolve_target: None,
             ops: wgpu::Operations {
-                load,
+                load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
                 store: wgpu::StoreOp::Store,
             },
         })

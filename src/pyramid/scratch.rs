@@ -208,7 +208,7 @@ mod tests {
             assert!(shader.contains(&format!("const TILE = {TILE}u;")));
             assert!(shader.contains(&format!("const ROWS_PER_OCTAVE = {rows:.1};")));
         }
-        for shared in ["const FLAT_LEVELS = 3u;", "const RING = 4"] {
+        for shared in ["const FLAT_LEVELS = 3u;", "const RING = 8"] {
             assert!(TILES.contains(shared) && PACK.contains(shared), "{shared}");
         }
     }
