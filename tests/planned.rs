@@ -303,24 +303,23 @@ fn other_pixels_stay_bit_for_bit() {
 
 #[test]
 fn no_scattering_leaks_onto_another_profile() {
-    // Two halves of one plane, the left of profile 1 and lit.
-    let g = View::orthographic([160, 96], 4.0).shoot(|origin, _| {
-        let left = origin.x < 0.0;
-        Some(Hit {
-            point: origin.truncate().extend(-300.0),
-            normal: DVec3::Z,
-            irradiance: DVec3::splat(f64::from(u8::from(left))),
-            id: if left { 1 } else { 2 },
-        })
-    });
+    // Two halves of one plane, the left of profile 1 and lit; facing, and so steep that taps reach far.
     let profiles = [Profile::SKIN; 2];
-    let plan = Plan::new(&profiles, 0.01).unwrap();
-    let out = g.scatter_planned(&profiles, &plan);
-    for (i, hit) in g.pixels(|_| true) {
-        assert!(
-            (rgb(out[i]) - hit.irradiance).abs().max_element() < 0.001,
-            "pixel {i}"
-        );
+    for (tilt, max_error) in [(0.0, 0.01), (75.0, 1.0 / 255.0)] {
+        let surface = plane(tilted_normal(tilt, 0.0), 300.0, |p| {
+            DVec3::splat(f64::from(u8::from(p.x < 0.0)))
+        });
+        let g = View::orthographic([160, 96], 4.0).shoot(|origin, ray| {
+            let hit = surface(origin, ray)?;
+            let id = if hit.point.x < 0.0 { 1 } else { 2 };
+            Some(Hit { id, ..hit })
+        });
+        let plan = Plan::new(&profiles, max_error).unwrap();
+        let out = g.scatter_planned(&profiles, &plan);
+        for (i, hit) in g.pixels(|_| true) {
+            let error = (rgb(out[i]) - hit.irradiance).abs().max_element();
+            assert!(error < 0.001, "{tilt}°, pixel {i}: {error}");
+        }
     }
 }
 
