@@ -31,8 +31,9 @@ const EXACT_ERROR: f32 = 0.0005;
 /// before; what changes with the scale is how much of each is taken. The weights are fitted so that
 /// the largest error on straight edges is the least, along the axes of the pixels, at 45° and at 27°:
 /// edges soft by σ = 1 px against the closed form, hard ones against the visible integral. It holds up
-/// to the px/mm of the last of [`rows`](Self::rows), where a profile is as wide as the last level; beyond,
-/// blurs stay as wide as there. Layers and detail of a pixel on steep slopes may be off by more (docs/method.md).
+/// to the px/mm of the last of [`rows`](Self::rows), where a profile is as wide as the last level;
+/// beyond, blurs stay as wide as there. Layers, and detail of a pixel on steep slopes, may be off by
+/// more (docs/method.md).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     max_error: f32,
@@ -199,6 +200,7 @@ mod tests {
         ] {
             let profile = Profile::new(&gaussians).unwrap();
             let plan = Plan::new(&[profile], 0.1).unwrap();
+            assert!(!plan.is_exact());
             for row in plan.rows(0) {
                 // Light that is moved between blurs is neither made nor lost.
                 let sum: Vec3 = row.weights.iter().sum();

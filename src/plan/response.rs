@@ -242,8 +242,7 @@ fn interpolation(pixel: i32, l: usize) -> Vec<(i32, f64)> {
 }
 
 impl Edge {
-    /// k of a pixel that lies on the edge, or of a hard one just beyond it; then the distance from the
-    /// edge that follows from k.
+    /// How far the pixels of k lie from the edge, in pixels; positive where it is lit.
     fn distance(&self, k: i32) -> f64 {
         let n = length(self.across);
         if self.soft {
