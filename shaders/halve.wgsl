@@ -23,10 +23,13 @@ fn fs_halve(@builtin(position) at: vec4f) -> Surface {
         let there = textureSampleLevel(finer_light, linear, uv, 0.0);
         light += 0.25 * there.a * vec4f(there.rgb, 1.0);
     }
-    let a = unpacked(textureLoad(finer_shape, 2 * pixel, 0).rg);
-    let b = unpacked(textureLoad(finer_shape, 2 * pixel + 1, 0).rg);
-    let shape = Shape(a.id, 0.5 * (a.z + b.z), 0.5 * (a.tangent + b.tangent));
-    return Surface(half_floats(vec4f(light.rgb / max(light.a, LEAST_AREA), light.a)), packed(shape));
+    let a = textureLoad(finer_shape, 2 * pixel, 0).rg;
+    let b = textureLoad(finer_shape, 2 * pixel + 1, 0).rg;
+    let z = 0.5 * (bitcast<f32>(a.y) + bitcast<f32>(b.y));
+    return Surface(
+        half_floats(vec4f(light.rgb / max(light.a, LEAST_AREA), light.a)),
+        packed(a.x >> 24u, z, 0.5 * (sines_of(a) + sines_of(b))),
+    );
 }
 
 // The surface is that of the nearest of the four pixels that this one covers.
@@ -55,28 +58,23 @@ fn halved(pixel: vec2i) -> Surface {
     let tolerance = TOLERANCE * max(mm.x, mm.y) * sqrt(1.0 + slope2);
     var light = vec4f(0.0);
     var z = 0.0;
-    var tangent = vec2f(0.0);
+    var sines = vec2f(0.0);
     for (var y = -1; y <= 2; y++) {
         for (var x = -1; x <= 2; x++) {
             let q = 2 * pixel + vec2i(x, y);
-            if any(q < vec2i(0)) || any(q > last) {
-                continue;
-            }
-            let there = unpacked(textureLoad(finer_shape, q, 0).rg);
-            if there.id != surface.id {
-                continue;
-            }
+            let there = textureLoad(finer_shape, q, 0).rg;
             let e = textureLoad(finer_light, q, 0);
-            // On its own plane, at the middle of this level's pixel.
+            // At the middle of this level's pixel, as the surface is inclined.
             let offset = (0.5 - vec2f(f32(x), f32(y))) * 0.5 * mm;
-            let z_there = there.z + dot(there.tangent, offset);
+            let z_there = bitcast<f32>(there.y) + dot(surface.tangent, offset);
             let is_outer = vec2f(f32(x == -1 || x == 2), f32(y == -1 || y == 2));
             let share = (3.0 - 2.0 * is_outer.x) * (3.0 - 2.0 * is_outer.y) / 64.0;
             let off = (z_there - nearest) / tolerance;
-            let w = share * e.a * saturate(2.0 - 2.0 * abs(off));
+            let is_same = there.x >> 24u == surface.id && all(q >= vec2i(0)) && all(q <= last);
+            let w = select(0.0, share * e.a * saturate(2.0 - 2.0 * abs(off)), is_same);
             light += w * vec4f(e.rgb, 1.0);
             z += w * z_there;
-            tangent += w * there.tangent;
+            sines += w * sines_of(there);
         }
     }
     let area = light.a;
@@ -85,6 +83,6 @@ fn halved(pixel: vec2i) -> Surface {
     }
     return Surface(
         half_floats(vec4f(light.rgb / area, max(area, LEAST_AREA))),
-        packed(Shape(surface.id, z / area, tangent / area)),
+        packed(surface.id, z / area, sines / area),
     );
 }

@@ -10,8 +10,6 @@
 const FLAT = 0.4;
 // Levels that may have flat tiles; as in tiles.wgsl.
 const FLAT_LEVELS = 3u;
-// Pixels that taps reach on flat tiles; as in tiles.wgsl.
-const RING = 8;
 
 fn z_at(pixel: vec2i) -> f32 {
     let d = textureLoad(depth, pixel, 0).r;
@@ -29,18 +27,6 @@ fn tangent(forward: f32, backward: f32, mm: f32) -> f32 {
     let dz = select(shorter, 0.5 * (forward + backward), mean);
     // What jumps on both sides faces the camera for all that is known.
     return select(0.0, dz / mm, abs(dz) < 40.0 * mm);
-}
-
-// Tells all tiles whose taps see this pixel at which levels it bends.
-fn mark_bent(pixel: vec2i, bent: u32, size: vec2i) {
-    let columns = (u32(size.x) + TILE - 1u) / TILE;
-    let first = vec2u(max(pixel - RING, vec2i(0))) / TILE;
-    let last = vec2u(min(pixel + RING, size - 1)) / TILE;
-    for (var y = first.y; y <= last.y; y++) {
-        for (var x = first.x; x <= last.x; x++) {
-            atomicOr(&bends[y * columns + x], bent);
-        }
-    }
 }
 
 @fragment
@@ -73,12 +59,15 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     if bend > FLAT / f32(1u << (FLAT_LEVELS - 1u)) {
         // 0 where all levels are bent, FLAT_LEVELS − 1 where the last is.
         let flat_levels = u32(max(ceil(log2(FLAT / bend)), 0.0));
-        mark_bent(pixel, (1u << FLAT_LEVELS) - (1u << flat_levels), size);
+        let columns = (u32(size.x) + TILE - 1u) / TILE;
+        let tile = vec2u(pixel) / TILE;
+        atomicOr(&bends[tile.y * columns + tile.x], (1u << FLAT_LEVELS) - (1u << flat_levels));
     }
     let shape = Shape(id, z, vec2f(tangent(east, west, mm.x), tangent(south, north, mm.y)));
     let plane = plane_of(pixel, shape);
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
     // What is packed is half floats, which end there.
     let light = min(textureLoad(irradiance, pixel, 0).rgb, vec3f(65504.0));
-    return Surface(half_floats(vec4f(light, area)), packed(shape));
+    let sines = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);
+    return Surface(half_floats(vec4f(light, area)), packed(id, z, sines));
 }

@@ -48,27 +48,37 @@ struct Level {
 // x in the low half: those that are simple from the front on, the others from the end.
 @group(0) @binding(2) var<storage, read> tiles: array<u32>;
 
-// Whether a tile may hold whatever there is; else it is skin of one profile throughout, nearly flat,
-// and so are the pixels around it.
+// Whether a tile may hold whatever there is; else it is skin of one profile throughout, nearly flat and
+// turned evenly, and so are the pixels around it.
 override CAREFUL: bool = true;
 
-const TILE = 16u;
+const TILE = 8u;
 // How far from the plane a pixel may lie to be of the same surface, in mm a pixel of the level.
 const TOLERANCE = 2.0;
 // A pixel that is hardly of any surface still is of one.
 const LEAST_AREA = 1e-3;
 
-// Two triangles to a tile.
+fn tile_of(instance: u32) -> vec2u {
+    let tile = tiles[select(instance, arrayLength(&tiles) - 1u - instance, CAREFUL)];
+    return vec2u(tile & 0xffffu, tile >> 16u);
+}
+
+// Corners of a tile, as a strip has them.
+fn corner_of(vertex: u32) -> vec2u {
+    return vec2u(vertex & 1u, vertex >> 1u);
+}
+
+fn on_screen(tile: vec2u, vertex: u32) -> vec4f {
+    let uv = vec2f((tile + corner_of(vertex)) * TILE) / level.size;
+    return vec4f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, 0.0, 1.0);
+}
+
 @vertex
 fn vs_tile(
     @builtin(vertex_index) vertex: u32,
     @builtin(instance_index) instance: u32,
 ) -> @builtin(position) vec4f {
-    let tile = tiles[select(instance, arrayLength(&tiles) - 1u - instance, CAREFUL)];
-    // Corners in the order of 0 0, 1 0, 0 1, 1 0, 1 1, 0 1.
-    let corner = vec2u((0x1au >> vertex) & 1u, (0x34u >> vertex) & 1u);
-    let uv = vec2f((vec2u(tile & 0xffffu, tile >> 16u) + corner) * TILE) / level.size;
-    return vec4f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, 0.0, 1.0);
+    return on_screen(tile_of(instance), vertex);
 }
 
 // The two textures that hold a surface.
@@ -95,15 +105,18 @@ fn half_floats(v: vec4f) -> vec4f {
 }
 
 // Slopes are kept as sines.
-fn packed(shape: Shape) -> vec2u {
-    let sine = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);
-    let steps = vec2u(clamp(sine * 2047.0 + 2048.5, vec2f(0.0), vec2f(4095.0)));
-    return vec2u(shape.id << 24u | steps.y << 12u | steps.x, bitcast<u32>(shape.z));
+fn packed(id: u32, z: f32, sines: vec2f) -> vec2u {
+    let steps = vec2u(clamp(sines * 2047.0 + 2048.5, vec2f(0.0), vec2f(4095.0)));
+    return vec2u(id << 24u | steps.y << 12u | steps.x, bitcast<u32>(z));
+}
+
+fn sines_of(shape: vec2u) -> vec2f {
+    return (vec2f(vec2u(shape.x, shape.x >> 12u) & vec2u(0xfffu)) - 2048.0) / 2047.0;
 }
 
 fn unpacked(shape: vec2u) -> Shape {
-    let sine = (vec2f(vec2u(shape.x, shape.x >> 12u) & vec2u(0xfffu)) - 2048.0) / 2047.0;
-    let tangent = sine * inverseSqrt(max(1.0 - sine * sine, vec2f(4e-4)));
+    let sines = sines_of(shape);
+    let tangent = sines * inverseSqrt(max(1.0 - sines * sines, vec2f(4e-4)));
     return Shape(shape.x >> 24u, bitcast<f32>(shape.y), tangent);
 }
 

@@ -12,25 +12,19 @@ struct View {
     profiles: u32,
 }
 
-// Side of a tile in pixels of its level.
-const TILE = 16u;
-// Pixels that taps reach on flat tiles.
-const RING = 8u;
+// Side of a tile in pixels of its level; taps reach as far.
+const TILE = 8u;
 // Levels that may have flat tiles.
 const FLAT_LEVELS = 3u;
+// How far from even slopes may be, as sines.
+const EVEN = 0.1;
 const ROWS_PER_OCTAVE = 6.0;
 
-// What is known of a tile: 1 + the highest level it needs, or 0 without skin; its profile; and where
-// it holds anything else: at all, or in the RING pixels at a side.
+// What is known of a tile: 1 + the highest level it needs, or 0 without skin; whether it holds anything
+// else, too; and its profile.
 const TOP = 0xfu;
-const ELSE_ANY = 0x10u;
-const ELSE_LEFT = 0x20u;
-const ELSE_RIGHT = 0x40u;
-const ELSE_ABOVE = 0x80u;
-const ELSE_BELOW = 0x100u;
-const ELSE_ALL = 0x1f0u;
+const ELSE = 0x10u;
 const ID_SHIFT = 16u;
-const NO_SKIN = ELSE_ALL;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var depth: texture_2d<f32>;
@@ -84,15 +78,13 @@ fn mark(
     }
     workgroupBarrier();
     let of_tile = atomicLoad(&largest_id);
-    if of_tile > 0u && id != of_tile {
-        let sides = vec4<bool>((inside.xy < vec2u(RING)), (inside.xy >= vec2u(TILE - RING)));
-        let bits = select(vec4u(0u), vec4u(ELSE_LEFT, ELSE_ABOVE, ELSE_RIGHT, ELSE_BELOW), sides);
-        atomicOr(&elsewhere, ELSE_ANY | bits.x | bits.y | bits.z | bits.w);
+    if id != of_tile {
+        atomicStore(&elsewhere, ELSE);
     }
     workgroupBarrier();
     if local == 0u {
         let skin = of_tile << ID_SHIFT | atomicLoad(&elsewhere) | atomicLoad(&top);
-        marked[tile.y * tiles.x + tile.x] = select(NO_SKIN, skin, of_tile > 0u);
+        marked[tile.y * tiles.x + tile.x] = select(ELSE, skin, of_tile > 0u);
     }
 }
 
@@ -121,6 +113,9 @@ struct Draw {
 @group(0) @binding(10) var<storage, read> bends_below: array<u32>;
 @group(0) @binding(11) var<storage, read_write> bends: array<u32>;
 
+// Where the frame's surface is, as in surface.wgsl.
+@group(0) @binding(12) var shape: texture_2d<u32>;
+
 struct Tile {
     marks: u32,
     bends: u32,
@@ -128,7 +123,7 @@ struct Tile {
 
 fn tile_below(tile: vec2i) -> Tile {
     if any(tile < vec2i(0)) || any(tile >= vec2i(level.below)) {
-        return Tile(NO_SKIN, 0u);
+        return Tile(ELSE, 0u);
     }
     let i = u32(tile.y) * level.below.x + u32(tile.x);
     return Tile(below[i], bends_below[i]);
@@ -143,59 +138,71 @@ fn tile_at(tile: vec2i) -> Tile {
     var highest = 0u;
     var id = 0u;
     for (var i = 0; i < 4; i++) {
-        let side = vec2i(i & 1, i >> 1u);
-        let child = tile_below(2 * tile + side);
+        let child = tile_below(2 * tile + vec2i(i & 1, i >> 1u));
         all.bends |= child.bends;
+        all.marks |= child.marks & ELSE;
         highest = max(highest, child.marks & TOP);
-        if (child.marks & ELSE_ANY) != 0u {
-            all.marks |= ELSE_ANY
-                | select(ELSE_LEFT, ELSE_RIGHT, side.x == 1)
-                | select(ELSE_ABOVE, ELSE_BELOW, side.y == 1);
-        }
         let child_id = child.marks >> ID_SHIFT;
         if child_id != 0u && id != 0u && child_id != id {
-            all.marks |= ELSE_ALL;
+            all.marks |= ELSE;
         }
         id = max(id, child_id);
     }
     all.marks |= id << ID_SHIFT | highest;
-    if id == 0u {
-        all.marks = NO_SKIN;
-    }
     return all;
 }
 
-// One thread a tile: lists those that need this level, and their neighbours, which kernels reach.
+// The sines of the slopes of the surface, along a row and along a column.
+fn slopes(pixel: vec2i) -> vec2f {
+    let last = vec2i(textureDimensions(shape)) - 1;
+    let packed = textureLoad(shape, clamp(pixel, vec2i(0), last), 0).r;
+    return (vec2f(vec2u(packed, packed >> 12u) & vec2u(0xfffu)) - 2048.0) / 2047.0;
+}
+
+// Whether the slopes of a tile are as between those at its corners.
+fn turns_evenly(tile: vec2i) -> bool {
+    let side = i32(TILE << level.level);
+    let first = tile * side;
+    let a = slopes(first);
+    let b = slopes(first + vec2i(side, 0));
+    let c = slopes(first + vec2i(0, side));
+    let d = slopes(first + vec2i(side, side));
+    var off = vec2f(0.0);
+    for (var i = 0; i < 9; i++) {
+        let at = vec2i(i % 3, i / 3);
+        let share = vec2f(at) / 2.0;
+        let between = mix(mix(a, b, share.x), mix(c, d, share.x), share.y);
+        off = max(off, abs(slopes(first + at * side / 2) - between));
+    }
+    return max(off.x, off.y) <= EVEN;
+}
+
+// One thread a tile: lists those with skin that need this level, or are next to one that does.
 @compute @workgroup_size(8, 8)
 fn gather(@builtin(global_invocation_id) at: vec3u) {
     if any(at.xy >= level.tiles) {
         return;
     }
     let middle = tile_at(vec2i(at.xy));
-    var bent = middle.bends;
-    var simple = level.level < FLAT_LEVELS && (middle.marks & ELSE_ANY) == 0u;
+    var bent = 0u;
+    var simple = level.level < FLAT_LEVELS;
     var top = 0u;
     for (var y = -1; y <= 1; y++) {
         for (var x = -1; x <= 1; x++) {
             let tile = tile_at(vec2i(at.xy) + vec2i(x, y));
             top = max(top, tile.marks & TOP);
-            // The sides that face the tile in the middle.
-            let facing = select(0u, ELSE_RIGHT, x < 0) | select(0u, ELSE_LEFT, x > 0)
-                | select(0u, ELSE_BELOW, y < 0) | select(0u, ELSE_ABOVE, y > 0);
-            let torn = (tile.marks & facing) == facing && facing != 0u;
-            simple &= !torn && tile.marks >> ID_SHIFT == middle.marks >> ID_SHIFT;
-            // Pixels of the frame itself have told the tiles around them.
-            bent |= select(tile.bends, 0u, level.level == 0u);
+            bent |= tile.bends;
+            simple &= (tile.marks & ELSE) == 0u && tile.marks >> ID_SHIFT == middle.marks >> ID_SHIFT;
         }
     }
     let i = at.y * level.tiles.x + at.x;
     here[i] = middle.marks;
     bends[i] = middle.bends;
-    if top <= level.level {
+    if top <= level.level || (middle.marks & TOP) == 0u {
         return;
     }
     let tile = at.y << 16u | at.x;
-    if simple && (bent >> level.level & 1u) == 0u {
+    if simple && (bent >> level.level & 1u) == 0u && turns_evenly(vec2i(at.xy)) {
         list[atomicAdd(&draws[0].instances, 1u)] = tile;
     } else {
         list[arrayLength(&list) - 1u - atomicAdd(&draws[1].instances, 1u)] = tile;

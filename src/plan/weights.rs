@@ -153,8 +153,8 @@ impl Weights {
         // Marking: depth and id. Packing: them again, four neighbours, the light. The copy.
         let mut sum = 2.0 + 7.0 + 1.0;
         for l in 0..=top {
-            // Where the surface is and its light, the taps, the coarser mean.
-            let blurred = 2 + blurs(l) + usize::from(l < top);
+            // The taps, the one in the middle at least; the coarser mean.
+            let blurred = blurs(l).max(1) + usize::from(l < top);
             // Four filtered fetches of light, two of where the surface is.
             let halved = if l > 0 { 6 } else { 0 };
             sum += (blurred + halved) as f32 * f32::powi(0.25, l as i32);

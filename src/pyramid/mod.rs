@@ -293,6 +293,7 @@ impl Frame {
                 (9, levels[l].list.as_entire_binding()),
                 (10, bends.as_entire_binding()),
                 (11, levels[l].bends.as_entire_binding()),
+                (12, Texture(&base.shape)),
             ];
             group(&passes.gather.layout, &entries)
         };
@@ -412,6 +413,6 @@ mod tests {
         };
         assert!(drawn_for(0).iter().all(|tiles| *tiles == [0, 0]));
         // Those at the border see what is beyond it.
-        assert_eq!(drawn_for(1)[0], [8 * 4, 10 * 6 - 8 * 4]);
+        assert_eq!(drawn_for(1)[0], [18 * 10, 20 * 12 - 18 * 10]);
     }
 }

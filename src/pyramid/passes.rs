@@ -23,7 +23,17 @@ macro_rules! over_surface {
 }
 pub(super) const PACK: &str = over_surface!("pack.wgsl");
 const HALVE: &str = over_surface!("halve.wgsl");
-pub(super) const BLUR: &str = over_surface!("blur.wgsl");
+/// The blurs where all is simple, and elsewhere.
+pub(super) const BLURS: [&str; 2] = [
+    concat!(
+        over_surface!("blur.wgsl"),
+        include_str!("../../shaders/simple.wgsl")
+    ),
+    concat!(
+        over_surface!("blur.wgsl"),
+        include_str!("../../shaders/careful.wgsl")
+    ),
+];
 pub(super) const TILES: &str = include_str!("../../shaders/tiles.wgsl");
 
 /// The shaders, which serve every plan.
@@ -31,7 +41,7 @@ pub(super) struct Shaders {
     tiles: ShaderModule,
     pack: ShaderModule,
     halve: ShaderModule,
-    blur: ShaderModule,
+    blurs: [ShaderModule; 2],
     copy: ShaderModule,
 }
 
@@ -47,7 +57,7 @@ impl Shaders {
             tiles: module("subsurface tiles", TILES),
             pack: module("subsurface pack", PACK),
             halve: module("subsurface halve", HALVE),
-            blur: module("subsurface blur", BLUR),
+            blurs: BLURS.map(|source| module("subsurface blur", source)),
             copy: module("subsurface copy", include_str!("../../shaders/copy.wgsl")),
         }
     }
@@ -73,22 +83,20 @@ impl Passes {
         let both = |draw: &dyn Fn(f64) -> Draw| [draw(0.0), draw(1.0)];
         let blur = |entry, target: wgpu::ColorTargetState, kinds: &Kinds| {
             let flag = |on| f64::from(u8::from(on));
-            both(&|careful| {
+            [(0, "vs_corner"), (1, "vs_tile")].map(|(careful, vertex)| {
                 let constants = [
-                    ("CAREFUL", careful),
+                    ("CAREFUL", careful as f64),
                     ("BLURS", kinds.variances_px2.len() as f64),
                     ("THIRTEEN", flag(kinds.shape == Shape::Thirteen)),
                     ("SQUARE", flag(kinds.square_px2.is_some())),
+                    ("FINEST", flag(entry == "fs_frame")),
                 ];
-                let bindings = [0, 1, 2, 3, 7, 8, 9, 10, 12];
-                let entries = ["vs_tile", entry];
-                let targets = &[Some(target.clone())];
                 Draw::new(
                     device,
-                    &shaders.blur,
-                    entries,
-                    &bindings,
-                    targets,
+                    &shaders.blurs[careful],
+                    [vertex, entry],
+                    &[0, 1, 2, 3, 7, 8, 9, 10, 12],
+                    &[Some(target.clone())],
                     &constants,
                 )
             })
@@ -100,7 +108,7 @@ impl Passes {
         };
         Self {
             mark: compute("mark", &[0, 1, 2, 3, 4]),
-            gather: compute("gather", &[5, 6, 7, 8, 9, 10, 11]),
+            gather: compute("gather", &[5, 6, 7, 8, 9, 10, 11, 12]),
             pack: both(&|careful| {
                 Draw::new(
                     device,
@@ -180,7 +188,7 @@ fn tiles_entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
     match binding {
         0 | 5 => buffer_entry(binding, at, BufferBindingType::Uniform),
         1 => texture_entry(binding, at, FLOAT),
-        2 => texture_entry(binding, at, TextureSampleType::Uint),
+        2 | 12 => texture_entry(binding, at, TextureSampleType::Uint),
         3 | 6 | 10 => buffer_entry(binding, at, READ),
         _ => buffer_entry(binding, at, WRITE),
     }
@@ -196,7 +204,7 @@ fn entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
             BufferBindingType::Uniform,
         ),
         2 => buffer_entry(binding, ShaderStages::VERTEX, READ),
-        3 => buffer_entry(binding, at, READ),
+        3 => buffer_entry(binding, at | ShaderStages::VERTEX, READ),
         4 | 5 => texture_entry(binding, at, FLOAT),
         7 | 9 => texture_entry(binding, at, FILTERED),
         11 => buffer_entry(binding, at, WRITE),
@@ -206,6 +214,7 @@ fn entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
             ty: BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
             count: None,
         },
+        8 => texture_entry(binding, at | ShaderStages::VERTEX, TextureSampleType::Uint),
         _ => texture_entry(binding, at, TextureSampleType::Uint),
     }
 }
@@ -281,7 +290,10 @@ impl Draw {
                 compilation_options: options(),
                 buffers: &[],
             },
-            primitive: Default::default(),
+            primitive: wgpu::PrimitiveState {
+                topology: wgpu::PrimitiveTopology::TriangleStrip,
+                ..Default::default()
+            },
             depth_stencil: None,
             multisample: Default::default(),
             fragment: Some(wgpu::FragmentState {
