@@ -36,10 +36,12 @@ impl Skin {
         frame: &Frame,
     ) -> Result<(), Error> {
         let inputs = ScreenFrame {
-            irradiance: &frame.irradiance, // linear, without albedo
-            depth: &frame.depth,           // as the projection wrote it
-            profile_id: &frame.profile_id, // 1 on skin, 0 elsewhere
-            output: &frame.scattered,      // multiply this one by the albedo
+            irradiance: &frame.irradiance,       // linear, without albedo
+            depth: &frame.depth,                 // as the projection wrote it
+            profile_id: Some(&frame.profile_id), // 1 on skin, 0 elsewhere
+            strength: None,
+            viewport: None,
+            output: &frame.scattered, // multiply this one by the albedo
             projection: frame.projection,
             mm_per_unit: 1000.0, // a scene in metres
             profiles: &[Profile::SKIN],

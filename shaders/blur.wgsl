@@ -15,12 +15,16 @@
 @group(0) @binding(9) var coarser_mean: texture_2d<f32>;
 @group(0) @binding(10) var coarser_shape: texture_2d<u32>;
 @group(0) @binding(12) var linear: sampler;
+// How much a pixel takes of its scattered light.
+@group(0) @binding(4) var strength: texture_2d<f32>;
 
 // How many blurs share their taps: (i, j) with i² + j² ≤ 2, or ≤ 4 where they are thirteen. One more may
 // have the square of 5×5, which is summed where it has weight.
 override BLURS: u32 = 1;
 override THIRTEEN: bool = false;
 override SQUARE: bool = false;
+// Whether only what scattering changes is written.
+override DIFFERENCE: bool = false;
 // Whether this is the frame itself, which nothing blurred before.
 override FINEST: bool = false;
 
@@ -201,7 +205,16 @@ fn mean_of(g: Gathered) -> vec4f {
     return half_floats(vec4f(mean, 1.0));
 }
 
-// What fs_frame tells. Writes no alpha: it is the host's.
-fn scattered(g: Gathered, e: vec3f) -> vec4f {
-    return vec4f(e * (1.0 - g.weight) + g.light, 1.0);
+// What fs_frame tells of a pixel that takes so much of its scattered light: all of it, or what it differs
+// by from before. Writes no alpha: it is the host's.
+fn scattered(g: Gathered, e: vec3f, share: f32) -> vec4f {
+    let difference = share * (g.light - e * g.weight);
+    return vec4f(select(e + difference, difference, DIFFERENCE), 1.0);
+}
+
+fn share_at(pixel: vec2i) -> f32 {
+    if view.has_strength == 0u {
+        return 1.0;
+    }
+    return saturate(textureLoad(strength, vec2i(view.first_pixel) + pixel, 0).r);
 }

@@ -197,11 +197,12 @@ fn fs_level(@builtin(position) at: vec4f) -> @location(0) vec4f {
 
 @fragment
 fn fs_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
-    let pixel = vec2i(at.xy);
+    let pixel = vec2i(at.xy) - vec2i(view.first_pixel);
     let shape = unpacked(textureLoad(here_shape, pixel, 0).rg);
-    if shape.id == 0u {
+    let share = share_at(pixel);
+    if shape.id == 0u || share <= 0.0 {
         discard;
     }
     let e = textureLoad(here_light, pixel, 0).rgb;
-    return scattered(gathered(pixel, e, shape), e);
+    return scattered(gathered(pixel, e, shape), e, share);
 }

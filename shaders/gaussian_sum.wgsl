@@ -20,6 +20,9 @@ struct Settings {
     gutter: i32,
     // Ids beyond this have no profile: no surface.
     profiles: u32,
+    has_strength: u32,
+    // Of the irradiance, the strength and the output, where these are larger than the surface.
+    first_pixel: vec2u,
 }
 
 @group(0) @binding(0) var<uniform> settings: Settings;
@@ -32,6 +35,8 @@ struct Settings {
 @group(0) @binding(4) var rows: texture_2d<f32>;
 // The Gaussians summed so far.
 @group(0) @binding(5) var sum: texture_2d<f32>;
+// How much a pixel takes of its scattered light.
+@group(0) @binding(6) var strength: texture_2d<f32>;
 
 // Beyond 3.5 σ a Gaussian on a plane holds e^(−3.5²/2) = .2 % of its mass.
 const REACH_SIGMAS = 3.5;
@@ -60,6 +65,10 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) gaussian
 struct Point {
     mm: vec3f,
     profile: u32,
+}
+
+fn irradiance_at(pixel: vec2i) -> vec4f {
+    return textureLoad(irradiance, vec2i(settings.first_pixel) + pixel, 0);
 }
 
 fn size() -> vec2i {
@@ -181,7 +190,7 @@ fn fs_source(vertex: Vertex) -> @location(0) vec4f {
         return vec4f(0.0);
     }
     let area = metric(pixel, here).area;
-    return vec4f(textureLoad(irradiance, pixel, 0).rgb * area, area);
+    return vec4f(irradiance_at(pixel).rgb * area, area);
 }
 
 // First pass: along the row, unnormalised, so that the area enters once.
@@ -346,18 +355,29 @@ fn fs_sum(vertex: Vertex) -> @location(0) vec4f {
     }
     if total.a <= 0.0 {
         // No area to speak of: nothing to share with.
-        return vec4f(before + g.rgb * textureLoad(irradiance, pixel, 0).rgb, 1.0);
+        return vec4f(before + g.rgb * irradiance_at(pixel).rgb, 1.0);
     }
     return vec4f(before + g.rgb * total.rgb / total.a, 1.0);
+}
+
+// The sum at a pixel of the surface, as much of it as the pixel takes; `before` bit for bit where that
+// is none.
+fn taken(pixel: vec2i, before: vec3f) -> vec3f {
+    let scattered = textureLoad(sum, pixel, 0).rgb;
+    if settings.has_strength == 0u {
+        return scattered;
+    }
+    let share = saturate(textureLoad(strength, vec2i(settings.first_pixel) + pixel, 0).r);
+    return select(mix(before, scattered, share), before, share <= 0.0);
 }
 
 // The result: the sum on the surface, carried into the gutter, and the input as it was elsewhere.
 @fragment
 fn fs_resolve(vertex: Vertex) -> @location(0) vec4f {
-    let pixel = vec2i(vertex.position.xy);
-    let before = textureLoad(irradiance, pixel, 0);
+    let pixel = vec2i(vertex.position.xy) - vec2i(settings.first_pixel);
+    let before = irradiance_at(pixel);
     if point(pixel).profile != 0u {
-        return vec4f(textureLoad(sum, pixel, 0).rgb, before.a);
+        return vec4f(taken(pixel, before.rgb), before.a);
     }
     for (var ring = 1; ring <= settings.gutter; ring++) {
         var total = vec4f(0.0);
@@ -366,7 +386,7 @@ fn fs_resolve(vertex: Vertex) -> @location(0) vec4f {
             for (var x = -ring; x <= ring; x++) {
                 let q = pixel + vec2i(x, y);
                 if max(abs(x), abs(y)) == ring && point_or_none(q).profile != 0u {
-                    total += vec4f(textureLoad(sum, q, 0).rgb, textureLoad(irradiance, q, 0).a);
+                    total += vec4f(textureLoad(sum, q, 0).rgb, irradiance_at(q).a);
                     count += 1.0;
                 }
             }
@@ -376,4 +396,15 @@ fn fs_resolve(vertex: Vertex) -> @location(0) vec4f {
         }
     }
     return before;
+}
+
+// What the result differs by from the input.
+@fragment
+fn fs_difference(vertex: Vertex) -> @location(0) vec4f {
+    let pixel = vec2i(vertex.position.xy) - vec2i(settings.first_pixel);
+    if point(pixel).profile == 0u {
+        discard;
+    }
+    let before = irradiance_at(pixel).rgb;
+    return vec4f(taken(pixel, before) - before, 0.0);
 }

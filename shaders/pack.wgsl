@@ -11,8 +11,12 @@ const FLAT = 0.4;
 // Levels that may have flat tiles; as in tiles.wgsl.
 const FLAT_LEVELS = 3u;
 
+fn depth_at(pixel: vec2i) -> f32 {
+    return textureLoad(depth, vec2i(view.first_pixel) + pixel, 0).r;
+}
+
 fn z_at(pixel: vec2i) -> f32 {
-    let d = textureLoad(depth, pixel, 0).r;
+    let d = depth_at(pixel);
     let c = view.depth_to_mm;
     return (c.x * d + c.y) / (c.z * d + c.w);
 }
@@ -33,15 +37,19 @@ fn tangent(forward: f32, backward: f32, mm: f32) -> f32 {
 fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     let pixel = vec2i(at.xy);
     let none = Surface(vec4f(0.0), vec2u(0u));
-    let id = textureLoad(profile_id, pixel, 0).r;
+    let pixel_of_host = vec2i(view.first_pixel) + pixel;
+    var id = 1u;
+    if view.has_id != 0u {
+        id = textureLoad(profile_id, pixel_of_host, 0).r;
+    }
     if id == 0u || id > view.profiles {
         return none;
     }
-    let size = vec2i(textureDimensions(depth));
+    let size = vec2i(view.size);
     let last = size - 1;
     let z = z_at(pixel);
     // Infinitely far away there is no surface.
-    if !(abs(z) < 3e38) {
+    if !(abs(z) < 3e38) || depth_at(pixel) == view.far {
         return none;
     }
     let left = z_at(vec2i(max(pixel.x - 1, 0), pixel.y));
@@ -67,7 +75,7 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     let plane = plane_of(pixel, shape);
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
     // What is packed is half floats, which end there.
-    let light = min(textureLoad(irradiance, pixel, 0).rgb, vec3f(65504.0));
+    let light = min(textureLoad(irradiance, pixel_of_host, 0).rgb, vec3f(65504.0));
     let sines = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);
     return Surface(half_floats(vec4f(light, area)), packed(id, z, sines));
 }

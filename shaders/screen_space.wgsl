@@ -5,6 +5,13 @@
 struct Settings {
     // Normalised device coordinates to view space, in mm.
     inverse_projection: mat4x4f,
+    // Of the viewport, in the textures.
+    first_pixel: vec2u,
+    size: vec2f,
+    // The depth at which there is no surface.
+    far: f32,
+    // 0: all of the surface is of the first profile.
+    has_id: u32,
 }
 
 @group(0) @binding(0) var<uniform> settings: Settings;
@@ -20,16 +27,19 @@ fn vs_main(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
 // Position in mm, and the profile id; zero where nothing scatters.
 @fragment
 fn fs_positions(@builtin(position) at: vec4f) -> @location(0) vec4f {
-    let pixel = vec2i(at.xy);
-    let id = textureLoad(profile_id, pixel, 0).r;
-    if id == 0u {
+    let pixel = vec2i(at.xy) + vec2i(settings.first_pixel);
+    var id = 1u;
+    if settings.has_id != 0u {
+        id = textureLoad(profile_id, pixel, 0).r;
+    }
+    let d = textureLoad(depth, pixel, 0).r;
+    if id == 0u || d == settings.far {
         return vec4f(0.0);
     }
-    let uv = at.xy / vec2f(textureDimensions(depth));
-    let ndc = vec4f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, textureLoad(depth, pixel, 0).r, 1.0);
-    let p = settings.inverse_projection * ndc;
-    // Infinitely far away there is no surface.
-    if p.w == 0.0 {
+    let uv = at.xy / settings.size;
+    let p = settings.inverse_projection * vec4f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, d, 1.0);
+    // Infinitely far away there is no surface, nor where the depth is no number.
+    if !(abs(p.z) < 3e38 * abs(p.w)) {
         return vec4f(0.0);
     }
     return vec4f(p.xyz / p.w, f32(id));

@@ -115,7 +115,11 @@ fn fs_level(tile: Corner) -> @location(0) vec4f {
 
 @fragment
 fn fs_frame(tile: Corner) -> @location(0) vec4f {
-    let pixel = vec2i(tile.at.xy);
+    let pixel = vec2i(tile.at.xy) - vec2i(view.first_pixel);
+    let share = share_at(pixel);
+    if share <= 0.0 {
+        discard;
+    }
     let e = textureLoad(here_light, pixel, 0);
-    return scattered(gathered(pixel, e, tile), e.rgb);
+    return scattered(gathered(pixel, e, tile), e.rgb, share);
 }

@@ -13,6 +13,14 @@ struct View {
     rows: u32,
     stride: u32,
     profiles: u32,
+    // Of the viewport, in the textures of the host.
+    first_pixel: vec2u,
+    size: vec2u,
+    // The depth at which there is no surface.
+    far: f32,
+    // 0: all of the surface is of the first profile.
+    has_id: u32,
+    has_strength: u32,
 }
 
 // A Gaussian, cut off by a shape of taps.

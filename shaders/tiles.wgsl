@@ -10,6 +10,11 @@ struct View {
     rows: u32,
     stride: u32,
     profiles: u32,
+    first_pixel: vec2u,
+    size: vec2u,
+    far: f32,
+    has_id: u32,
+    has_strength: u32,
 }
 
 // Side of a tile in pixels of its level; taps reach as far.
@@ -47,18 +52,22 @@ fn mark(
     @builtin(num_workgroups) tiles: vec3u,
 ) {
     var id = 0u;
-    if all(at.xy < textureDimensions(profile_id)) {
-        id = textureLoad(profile_id, at.xy, 0).r;
+    let pixel = view.first_pixel + at.xy;
+    if all(at.xy < view.size) {
+        id = 1u;
+        if view.has_id != 0u {
+            id = textureLoad(profile_id, pixel, 0).r;
+        }
         if id > view.profiles {
             id = 0u;
         }
     }
     if id > 0u {
-        let d = textureLoad(depth, at.xy, 0).r;
+        let d = textureLoad(depth, pixel, 0).r;
         let z = (view.depth_to_mm.x * d + view.depth_to_mm.y)
             / (view.depth_to_mm.z * d + view.depth_to_mm.w);
         // Infinitely far away there is no surface.
-        if !(abs(z) < 3e38) {
+        if !(abs(z) < 3e38) || d == view.far {
             id = 0u;
         } else {
             let mm = abs(view.step.xy * z + view.step.zw);

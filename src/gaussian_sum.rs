@@ -2,13 +2,15 @@
 //! the texture-space effect share. Driver of `shaders/gaussian_sum.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec4;
+use glam::{UVec2, Vec4};
 use wgpu::util::DeviceExt;
 use wgpu::{
-    BindGroup, BindGroupLayout, CommandEncoder, Device, RenderPipeline, TextureFormat, TextureView,
+    BindGroup, BindGroupLayout, ColorTargetState, CommandEncoder, Device, RenderPipeline,
+    TextureFormat, TextureView,
 };
 
-use crate::{MAX_PROFILES, Profile};
+use crate::frame::Viewport;
+use crate::{MAX_PROFILES, Output, Profile};
 
 /// Per pixel: E·A and A, Σ over a row, and the running sum. Full floats: twelve roundings to half
 /// floats would lose energy.
@@ -19,6 +21,7 @@ const IRRADIANCE: u32 = 2;
 const SOURCE: u32 = 3;
 const ROWS: u32 = 4;
 const SUM: u32 = 5;
+const STRENGTH: u32 = 6;
 
 /// `Settings` of the shader.
 #[repr(C)]
@@ -31,7 +34,10 @@ pub(crate) struct Settings {
     /// Pixels.
     pub gutter: i32,
     pub profiles: u32,
-    pub pad: u32,
+    pub has_strength: u32,
+    /// Of the irradiance, the output and the strength.
+    pub first_pixel: UVec2,
+    pub pad: [u32; 2],
 }
 
 impl Settings {
@@ -57,6 +63,7 @@ impl Settings {
 /// The passes, and what they need for the frame that was last prepared.
 pub(crate) struct GaussianSum {
     label: &'static str,
+    output: Output,
     source: Pass,
     rows: Pass,
     sum: Pass,
@@ -83,6 +90,7 @@ struct Scratch {
 struct Frame {
     gaussians: u32,
     output: TextureView,
+    viewport: Option<Viewport>,
     source: BindGroup,
     rows: BindGroup,
     /// Reads the one sum, writes the other.
@@ -95,42 +103,46 @@ pub(crate) struct Inputs<'a> {
     pub positions: &'a TextureView,
     pub irradiance: &'a TextureView,
     pub output: &'a TextureView,
+    pub strength: Option<&'a TextureView>,
+    pub viewport: Option<Viewport>,
     pub profiles: &'a [Profile],
     pub settings: Settings,
 }
 
 impl GaussianSum {
-    pub fn new(device: &Device, output_format: TextureFormat, label: &'static str) -> Self {
+    pub fn new(device: &Device, output: Output, label: &'static str) -> Self {
         let shader =
             device.create_shader_module(wgpu::include_wgsl!("../shaders/gaussian_sum.wgsl"));
-        let pass = |name: &str, textures: &[u32], format| {
-            Pass::new(
-                device,
-                &shader,
-                &format!("{label} {name}"),
-                name,
-                textures,
-                format,
-            )
+        let pass = |name: &str, textures: &[u32], target| {
+            let label = format!("{label} {name}");
+            Pass::new(device, &shader, &label, name, textures, target)
+        };
+        let resolve = match output.is_difference() {
+            true => "fs_difference",
+            false => "fs_resolve",
         };
         Self {
             label,
-            source: pass("fs_source", &[POSITIONS, IRRADIANCE], SCRATCH),
-            rows: pass("fs_rows", &[POSITIONS, SOURCE], SCRATCH),
+            output,
+            source: pass("fs_source", &[POSITIONS, IRRADIANCE], SCRATCH.into()),
+            rows: pass("fs_rows", &[POSITIONS, SOURCE], SCRATCH.into()),
             sum: pass(
                 "fs_sum",
                 &[POSITIONS, IRRADIANCE, SOURCE, ROWS, SUM],
-                SCRATCH,
+                SCRATCH.into(),
             ),
-            resolve: pass("fs_resolve", &[POSITIONS, IRRADIANCE, SUM], output_format),
+            resolve: pass(
+                resolve,
+                &[POSITIONS, IRRADIANCE, SUM, STRENGTH],
+                output.target(wgpu::ColorWrites::ALL),
+            ),
             scratch: None,
             frame: None,
         }
     }
 
     pub fn prepare(&mut self, device: &Device, inputs: &Inputs) {
-        let texture = inputs.irradiance.texture();
-        let size = [texture.width(), texture.height()];
+        let size = crate::input::size(inputs.positions);
         if self.scratch.as_ref().is_none_or(|s| s.size != size) {
             self.scratch = None; // The old one goes before the new one comes.
         }
@@ -146,6 +158,8 @@ impl GaussianSum {
                 IRRADIANCE => inputs.irradiance,
                 SOURCE => &scratch.source,
                 ROWS => &scratch.rows,
+                // Not looked at where there is none.
+                STRENGTH => inputs.strength.unwrap_or(inputs.irradiance),
                 _ => &scratch.sums[sum],
             })
         };
@@ -158,6 +172,7 @@ impl GaussianSum {
         self.frame = Some(Frame {
             gaussians: gaussians as u32,
             output: inputs.output.clone(),
+            viewport: inputs.viewport,
             source: group(&self.source, 0),
             rows: group(&self.rows, 0),
             sums: [group(&self.sum, 0), group(&self.sum, 1)],
@@ -176,7 +191,15 @@ impl GaussianSum {
             self.sum
                 .draw(encoder, &frame.sums[from], &scratch.sums[1 - from], i);
         }
-        self.resolve.draw(encoder, &frame.resolve, &frame.output, 0);
+        let keeps = self.output.adds() || frame.viewport.is_some();
+        let label = &self.resolve.label;
+        let mut pass = begin(encoder, label, &[&frame.output], keeps);
+        if let Some(viewport) = frame.viewport {
+            viewport.apply(&mut pass);
+        }
+        pass.set_pipeline(&self.resolve.pipeline);
+        pass.set_bind_group(0, &frame.resolve, &[]);
+        pass.draw(0..3, 0..1);
     }
 }
 
@@ -271,7 +294,7 @@ pub(crate) fn full_screen(
     label: &str,
     entry_point: &str,
     layout: &BindGroupLayout,
-    format: TextureFormat,
+    target: ColorTargetState,
 ) -> RenderPipeline {
     let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(label),
@@ -294,7 +317,7 @@ pub(crate) fn full_screen(
             module: shader,
             entry_point: Some(entry_point),
             compilation_options: Default::default(),
-            targets: &[Some(format.into())],
+            targets: &[Some(target)],
         }),
         multiview_mask: None,
         cache: None,
@@ -310,23 +333,41 @@ pub(crate) fn draw_full_screen(
     target: &TextureView,
     instance: u32,
 ) {
-    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some(label),
-        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-            view: target,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations {
-                // Every pixel is written; clearing spares tilers the load.
-                load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                store: wgpu::StoreOp::Store,
-            },
-        })],
-        ..Default::default()
-    });
+    // Every pixel is written.
+    let mut pass = begin(encoder, label, &[target], false);
     pass.set_pipeline(pipeline);
     pass.set_bind_group(0, group, &[]);
     pass.draw(0..3, instance..instance + 1);
+}
+
+/// Begins a pass over targets that keep what they hold, or are cleared, which spares tilers the load.
+pub(crate) fn begin<'a>(
+    encoder: &'a mut CommandEncoder,
+    label: &str,
+    targets: &[&TextureView],
+    keeps: bool,
+) -> wgpu::RenderPass<'a> {
+    let load = match keeps {
+        true => wgpu::LoadOp::Load,
+        false => wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+    };
+    let attachment = |view| {
+        Some(wgpu::RenderPassColorAttachment {
+            view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load,
+                store: wgpu::StoreOp::Store,
+            },
+        })
+    };
+    let attachments: Vec<_> = targets.iter().map(|view| attachment(*view)).collect();
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(label),
+        color_attachments: &attachments,
+        ..Default::default()
+    })
 }
 
 impl Pass {
@@ -336,7 +377,7 @@ impl Pass {
         label: &str,
         entry_point: &str,
         textures: &[u32],
-        format: TextureFormat,
+        target: ColorTargetState,
     ) -> Self {
         let mut entries = vec![UNIFORM];
         entries.extend(textures.iter().map(|&binding| float_texture(binding)));
@@ -346,7 +387,7 @@ impl Pass {
         });
         Self {
             label: label.into(),
-            pipeline: full_screen(device, shader, label, entry_point, &layout, format),
+            pipeline: full_screen(device, shader, label, entry_point, &layout, target),
             textures: textures.to_vec(),
             layout,
         }
@@ -393,7 +434,9 @@ mod tests {
                 spacing,
                 mm_per_unit,
                 gutter,
-                profiles
+                profiles,
+                has_strength,
+                first_pixel
             }
         );
     }

@@ -2,7 +2,7 @@
 
 use wgpu::{TextureFormat, TextureSampleType, TextureUsages, TextureView};
 
-use crate::{Error, Profile};
+use crate::{Error, Output, Profile};
 
 /// What a texture is read or written as.
 #[derive(Clone, Copy)]
@@ -15,6 +15,8 @@ pub(crate) enum Role {
     Depth,
     /// Read as an unsigned integer.
     Id,
+    /// Read as one float, the first of any number.
+    Strength,
     /// Rendered to.
     Target(TextureFormat),
 }
@@ -43,6 +45,10 @@ pub(crate) fn check_texture(
         Role::Id => (
             matches!(kind, Some(TextureSampleType::Uint)) && format.components() == 1,
             "one unsigned integer channel".into(),
+        ),
+        Role::Strength => (
+            float && !format.has_depth_aspect(),
+            "float channels, such as R8Unorm".into(),
         ),
         Role::Target(wanted) => (format == wanted, format!("{wanted:?}")),
     };
@@ -126,11 +132,9 @@ pub(crate) fn check_mm_per_unit(mm_per_unit: f32) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks that passes can render to `format`.
-pub(crate) fn check_output_format(
-    device: &wgpu::Device,
-    format: TextureFormat,
-) -> Result<(), Error> {
+/// Checks that passes can render to an output, and add to it where they have to.
+pub(crate) fn check_output(device: &wgpu::Device, output: Output) -> Result<(), Error> {
+    let format = output.format();
     let float = matches!(
         format.sample_type(None, None),
         Some(TextureSampleType::Float { .. })
@@ -146,6 +150,14 @@ pub(crate) fn check_output_format(
             "output_format",
             format!("{format:?}"),
             "a format of three or four float channels that this device renders to",
+        ));
+    }
+    let blends = wgpu::TextureFormatFeatureFlags::BLENDABLE;
+    if output.adds() && !features.flags.contains(blends) {
+        return Err(Error::new(
+            "output_format",
+            format!("{format:?}"),
+            "a format that this device blends, such as Rgba16Float",
         ));
     }
     Ok(())

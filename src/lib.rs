@@ -9,6 +9,7 @@
 //! the host in the examples and tests; `truth` sums the integrals that all is measured against.
 
 mod error;
+mod frame;
 mod gaussian_sum;
 mod input;
 mod plan;
@@ -25,10 +26,11 @@ pub mod truth;
 mod wgsl;
 
 pub use error::Error;
+pub use frame::{Output, ScreenFrame, Viewport};
 pub use plan::{DEFAULT_MAX_ERROR, Plan, Row};
 pub use planned::PlannedScreenSpace;
 pub use profile::{Gaussian, Profile};
-pub use screen_space::{ScreenFrame, ScreenSpace};
+pub use screen_space::ScreenSpace;
 pub use texture_space::{Atlas, TextureSpace};
 pub use wgpu;
 

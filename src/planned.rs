@@ -1,11 +1,10 @@
 //! Scattering in screen space at a stated error.
 
-use glam::Vec4;
-use wgpu::{CommandEncoder, Device, Queue, TextureFormat};
+use wgpu::{CommandEncoder, Device, Queue};
 
-use crate::pyramid::{Inputs, Optics, Pyramid};
-use crate::screen_space::{check, inverse_mm};
-use crate::{Error, Plan, ScreenFrame, ScreenSpace};
+use crate::frame::Optics;
+use crate::pyramid::{Inputs, Pyramid};
+use crate::{Error, Output, Plan, ScreenFrame, ScreenSpace};
 
 /// Scattering in screen space by a [`Plan`]: the error that a host accepts, and no more work than that.
 ///
@@ -21,20 +20,21 @@ use crate::{Error, Plan, ScreenFrame, ScreenSpace};
 ///
 /// Scratch memory: 23.9 bytes a pixel; 80 where the plan is exact.
 pub struct PlannedScreenSpace {
-    output_format: TextureFormat,
+    output: Output,
     pyramid: Pyramid,
     /// Only while the plan is exact.
     exact: Option<ScreenSpace>,
 }
 
 impl PlannedScreenSpace {
-    /// The effect for outputs of `output_format`.
+    /// The effect that writes this output: a format such as Rgba16Float, or an [`Output`].
     ///
     /// # Errors
-    /// A format that cannot be rendered to on this device; a device with less than WebGPU's default
-    /// limits.
-    pub fn new(device: &Device, output_format: TextureFormat) -> Result<Self, Error> {
-        crate::input::check_output_format(device, output_format)?;
+    /// A format that cannot be rendered to, or blended, on this device; a device with less than WebGPU's
+    /// default limits.
+    pub fn new(device: &Device, output: impl Into<Output>) -> Result<Self, Error> {
+        let output = output.into();
+        crate::input::check_output(device, output)?;
         let limits = device.limits();
         let (buffers, threads) = (
             limits.max_storage_buffers_per_shader_stage,
@@ -48,8 +48,8 @@ impl PlannedScreenSpace {
             ));
         }
         Ok(Self {
-            output_format,
-            pyramid: Pyramid::new(device, output_format),
+            output,
+            pyramid: Pyramid::new(device, output),
             exact: None,
         })
     }
@@ -66,7 +66,7 @@ impl PlannedScreenSpace {
         frame: &ScreenFrame,
         plan: &Plan,
     ) -> Result<(), Error> {
-        check(frame, self.output_format)?;
+        frame.check(self.output)?;
         if plan.profiles() != frame.profiles {
             return Err(Error::new(
                 "plan",
@@ -78,7 +78,7 @@ impl PlannedScreenSpace {
             match &mut self.exact {
                 Some(exact) => exact.prepare(device, frame)?,
                 None => {
-                    let mut exact = ScreenSpace::new(device, self.output_format)?;
+                    let mut exact = ScreenSpace::new(device, self.output)?;
                     exact.prepare(device, frame)?;
                     self.exact = Some(exact);
                     self.pyramid.forget();
@@ -86,19 +86,21 @@ impl PlannedScreenSpace {
             }
             return Ok(());
         };
-        let optics = optics(frame)?;
-        self.pyramid.prepare(
-            device,
-            queue,
-            &Inputs {
-                irradiance: frame.irradiance,
-                depth: frame.depth,
-                profile_id: frame.profile_id,
-                output: frame.output,
-                optics,
-                plan,
-            },
-        );
+        let optics = Optics::new(frame)?;
+        let [z, w] = [2, 3].map(|i| frame.projection.row(i));
+        if [z.x, z.y, w.x, w.y].iter().any(|c| *c != 0.0) {
+            return Err(Error::new(
+                "projection",
+                format!("{}", frame.projection),
+                "depth that does not depend on x and y",
+            ));
+        }
+        let inputs = Inputs {
+            frame,
+            optics,
+            plan,
+        };
+        self.pyramid.prepare(device, queue, &inputs);
         self.exact = None;
         Ok(())
     }
@@ -115,41 +117,4 @@ impl PlannedScreenSpace {
             None => self.pyramid.render(encoder),
         }
     }
-}
-
-/// With clip x = P₀₀·X + P₀₂·z + P₀₃ and clip w = P₃₂·z + P₃₃, all in units of the scene,
-/// X = (x′·w − P₀₂·z − P₀₃)/P₀₀ at the device coordinate x′, which is linear over the pixels.
-fn optics(frame: &ScreenFrame) -> Result<Optics, Error> {
-    let inverse = inverse_mm(frame.projection, frame.mm_per_unit)?;
-    let size = crate::input::size(frame.irradiance);
-    let [x, y, z, w] = [0, 1, 2, 3].map(|i| frame.projection.row(i));
-    if [z.x, z.y, w.x, w.y].iter().any(|c| *c != 0.0) {
-        return Err(Error::new(
-            "projection",
-            format!("{}", frame.projection),
-            "depth that does not depend on x and y",
-        ));
-    }
-    let mm = frame.mm_per_unit;
-    let at = |ndc: f32, row: Vec4, scale: f32| {
-        [
-            (ndc * w.z - row.z) / scale,
-            (ndc * w.w - row.w) / scale * mm,
-        ]
-    };
-    let step = |ndc: f32, scale: f32| [ndc * w.z / scale, ndc * w.w / scale * mm];
-    let [ux, vx] = at(-1.0, x, x.x);
-    let [uy, vy] = at(1.0, y, y.y);
-    let [dux, dvx] = step(2.0 / size[0] as f32, x.x);
-    let [duy, dvy] = step(-2.0 / size[1] as f32, y.y);
-    Ok(Optics {
-        origin: Vec4::new(ux, uy, vx, vy),
-        step: Vec4::new(dux, duy, dvx, dvy),
-        depth_to_mm: Vec4::new(
-            inverse.z_axis.z,
-            inverse.w_axis.z,
-            inverse.z_axis.w,
-            inverse.w_axis.w,
-        ),
-    })
 }

@@ -2,40 +2,12 @@
 //! `shaders/screen_space.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat4, DVec3, Mat4, Vec4};
+use glam::{Mat4, UVec2, Vec2};
 use wgpu::{CommandEncoder, Device, TextureFormat, TextureView};
 
+use crate::frame::Optics;
 use crate::gaussian_sum::{self, GaussianSum, Inputs};
-use crate::input::{self, Role};
-use crate::{Error, Profile};
-
-/// One frame of a deferred renderer, as [`ScreenSpace::prepare`] takes it.
-///
-/// All textures are two-dimensional, single-sampled, and of one size; their views are of two
-/// dimensions, of mip level 0 and in the texture's own format, which wgpu leaves to the host to see
-/// to.
-#[derive(Clone, Copy, Debug)]
-pub struct ScreenFrame<'a> {
-    /// Lit diffuse irradiance E, linear and finite RGB, *before* albedo, specular and tone
-    /// mapping; three or four float channels. Alpha is kept.
-    pub irradiance: &'a TextureView,
-    /// Depth as `projection` wrote it: a depth format of 24 bits or more, or R32Float. Of a format
-    /// that has stencil, too, the view must be depth-only.
-    pub depth: &'a TextureView,
-    /// Which of `profiles` a pixel scatters by, counted from 1; 0 where nothing scatters. One
-    /// unsigned integer channel, such as R8Uint.
-    pub profile_id: &'a TextureView,
-    /// Where the result goes, in the format that [`ScreenSpace::new`] was told: the scattered
-    /// irradiance, and the irradiance as it was where nothing scatters.
-    pub output: &'a TextureView,
-    /// View space to clip space, as wgpu has it: depth from 0 to 1, y up. Perspective or
-    /// orthographic, forward, reversed or infinite; off-centre and jittered ones, too.
-    pub projection: Mat4,
-    /// Length of a scene unit in mm: 1000 where the scene is in metres.
-    pub mm_per_unit: f32,
-    /// The profiles of this frame, 1 to [`MAX_PROFILES`](crate::MAX_PROFILES).
-    pub profiles: &'a [Profile],
-}
+use crate::{Error, Output, ScreenFrame, input};
 
 /// Exact scattering in screen space: each Gaussian of the profile in two passes, by the distances
 /// between the surface points that the pixels show.
@@ -46,9 +18,11 @@ pub struct ScreenFrame<'a> {
 ///
 /// Scratch memory: 80 bytes a pixel.
 pub struct ScreenSpace {
-    output_format: TextureFormat,
+    output: Output,
     layout: wgpu::BindGroupLayout,
     pipeline: wgpu::RenderPipeline,
+    /// Bound where a frame has no ids.
+    no_id: TextureView,
     positions: Option<TextureView>,
     group: Option<wgpu::BindGroup>,
     sum: GaussianSum,
@@ -59,16 +33,21 @@ pub struct ScreenSpace {
 #[derive(Clone, Copy, Pod, Zeroable)]
 struct Settings {
     inverse_projection: Mat4,
+    first_pixel: UVec2,
+    size: Vec2,
+    far: f32,
+    has_id: u32,
+    pad: [u32; 2],
 }
 
 impl ScreenSpace {
-    /// The effect for outputs of `output_format`, a renderable format of three or four float
-    /// channels such as Rgba16Float.
+    /// The effect that writes this output: a format such as Rgba16Float, or an [`Output`].
     ///
     /// # Errors
-    /// A format that cannot be rendered to on this device.
-    pub fn new(device: &Device, output_format: TextureFormat) -> Result<Self, Error> {
-        input::check_output_format(device, output_format)?;
+    /// A format that cannot be rendered to, or blended, on this device.
+    pub fn new(device: &Device, output: impl Into<Output>) -> Result<Self, Error> {
+        let output = output.into();
+        input::check_output(device, output)?;
         let label = "subsurface::ScreenSpace positions";
         let shader =
             device.create_shader_module(wgpu::include_wgsl!("../shaders/screen_space.wgsl"));
@@ -81,19 +60,20 @@ impl ScreenSpace {
             ],
         });
         Ok(Self {
-            output_format,
+            output,
             pipeline: gaussian_sum::full_screen(
                 device,
                 &shader,
                 label,
                 "fs_positions",
                 &layout,
-                gaussian_sum::SCRATCH,
+                gaussian_sum::SCRATCH.into(),
             ),
             layout,
+            no_id: gaussian_sum::scratch_view(device, label, [1, 1], TextureFormat::R8Uint),
             positions: None,
             group: None,
-            sum: GaussianSum::new(device, output_format, "subsurface::ScreenSpace"),
+            sum: GaussianSum::new(device, output, "subsurface::ScreenSpace"),
         })
     }
 
@@ -103,14 +83,21 @@ impl ScreenSpace {
     /// # Errors
     /// The first input that does not fit; the frame prepared before stays in place.
     pub fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<(), Error> {
-        check(frame, self.output_format)?;
-        let size = input::size(frame.irradiance);
-        let inverse_projection = inverse_mm(frame.projection, frame.mm_per_unit)?;
-
+        frame.check(self.output)?;
+        let optics = Optics::new(frame)?;
+        let viewport = frame.viewport();
+        let size = viewport.size();
         let settings = gaussian_sum::uniform(
             device,
             "subsurface::ScreenSpace positions",
-            &Settings { inverse_projection },
+            &Settings {
+                inverse_projection: optics.inverse_projection,
+                first_pixel: viewport.first(),
+                size: UVec2::from(size).as_vec2(),
+                far: optics.far,
+                has_id: u32::from(frame.profile_id.is_some()),
+                pad: [0; 2],
+            },
         );
         let positions = match self.positions.take() {
             Some(view) if input::size(&view) == size => view,
@@ -135,7 +122,9 @@ impl ScreenSpace {
                 },
                 wgpu::BindGroupEntry {
                     binding: 2,
-                    resource: wgpu::BindingResource::TextureView(frame.profile_id),
+                    resource: wgpu::BindingResource::TextureView(
+                        frame.profile_id.unwrap_or(&self.no_id),
+                    ),
                 },
             ],
         }));
@@ -145,9 +134,13 @@ impl ScreenSpace {
                 positions: &positions,
                 irradiance: frame.irradiance,
                 output: frame.output,
+                strength: frame.strength,
+                viewport: frame.viewport,
                 profiles: frame.profiles,
                 settings: gaussian_sum::Settings {
-                    spacing: spacing(frame.projection, size, frame.mm_per_unit),
+                    spacing: optics.spacing(),
+                    first_pixel: viewport.first(),
+                    has_strength: u32::from(frame.strength.is_some()),
                     ..gaussian_sum::Settings::new(frame.profiles, 1.0)
                 },
             },
@@ -172,57 +165,6 @@ impl ScreenSpace {
     }
 }
 
-/// Checks all of a frame but its projection.
-pub(crate) fn check(frame: &ScreenFrame, output_format: TextureFormat) -> Result<(), Error> {
-    let size = input::size(frame.irradiance);
-    input::check_texture("irradiance", frame.irradiance, Role::Color, size)?;
-    input::check_texture("depth", frame.depth, Role::Depth, size)?;
-    input::check_texture("profile_id", frame.profile_id, Role::Id, size)?;
-    input::check_texture("output", frame.output, Role::Target(output_format), size)?;
-    input::check_apart(
-        frame.output,
-        &[
-            ("irradiance", frame.irradiance),
-            ("depth", frame.depth),
-            ("profile_id", frame.profile_id),
-        ],
-    )?;
-    input::check_mm_per_unit(frame.mm_per_unit)?;
-    input::check_profiles(frame.profiles)?;
-    Ok(())
-}
-
-/// Normalised device coordinates to view space in mm. In double precision, since the inverse of a
-/// projection with a near plane of a millimetre loses half of a float's digits.
-pub(crate) fn inverse_mm(projection: Mat4, mm_per_unit: f32) -> Result<Mat4, Error> {
-    let m = projection.as_dmat4();
-    let (x, y) = (projection.row(0), projection.row(1));
-    let inverse = DMat4::from_scale(DVec3::splat(mm_per_unit.into())) * m.inverse();
-    let inverse = inverse.as_mat4();
-    if !projection.is_finite() || !inverse.is_finite() || x.y != 0.0 || y.x != 0.0 {
-        return Err(Error::new(
-            "projection",
-            format!("{projection}"),
-            "a finite, invertible projection whose x and y stay apart",
-        ));
-    }
-    Ok(inverse)
-}
-
-/// The mm between pixels of a surface that faces the camera, at z mm in view space: along a row
-/// |x + y·z|, along a column |z + w·z|. With clip w = P₃₂·z + P₃₃ a pixel is 2w/(W·P₀₀) wide.
-fn spacing(projection: Mat4, size: [u32; 2], mm_per_unit: f32) -> Vec4 {
-    let w = projection.row(3);
-    let x = 2.0 / (size[0] as f32 * projection.x_axis.x);
-    let y = 2.0 / (size[1] as f32 * projection.y_axis.y);
-    Vec4::new(
-        x * w.w * mm_per_unit,
-        x * w.z,
-        y * w.w * mm_per_unit,
-        y * w.z,
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -233,7 +175,13 @@ mod tests {
         assert_layout!(
             include_str!("../shaders/screen_space.wgsl"),
             "Settings",
-            Settings { inverse_projection }
+            Settings {
+                inverse_projection,
+                first_pixel,
+                size,
+                far,
+                has_id
+            }
         );
     }
 }

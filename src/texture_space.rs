@@ -58,10 +58,10 @@ impl TextureSpace {
     /// # Errors
     /// A format that cannot be rendered to on this device.
     pub fn new(device: &Device, output_format: TextureFormat) -> Result<Self, Error> {
-        input::check_output_format(device, output_format)?;
+        input::check_output(device, output_format.into())?;
         Ok(Self {
             output_format,
-            sum: GaussianSum::new(device, output_format, "subsurface::TextureSpace"),
+            sum: GaussianSum::new(device, output_format.into(), "subsurface::TextureSpace"),
         })
     }
 
@@ -95,6 +95,8 @@ impl TextureSpace {
                 positions: atlas.positions,
                 irradiance: atlas.irradiance,
                 output: atlas.output,
+                strength: None,
+                viewport: None,
                 profiles: atlas.profiles,
                 settings: Settings {
                     gutter: GUTTER,

@@ -2,10 +2,15 @@
 
 mod common;
 
+use std::sync::OnceLock;
+
 use common::gpu;
 use glam::Mat4;
 use subsurface::wgpu::{self, TextureFormat, TextureUsages, TextureView};
-use subsurface::{Atlas, Error, Profile, ScreenFrame, ScreenSpace, TextureSpace};
+use subsurface::{
+    Atlas, Error, Output, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace,
+    TextureSpace, Viewport,
+};
 
 const SIZE: [u32; 2] = [16, 8];
 
@@ -33,45 +38,66 @@ fn texture(format: TextureFormat, usage: TextureUsages, samples: u32) -> Texture
         .create_view(&Default::default())
 }
 
-/// Prepares a frame in which `change` has changed one thing.
+/// Prepares a frame in which `change` has changed one thing, by both effects.
 fn screen(change: impl FnOnce(&mut Inputs)) -> Result<(), Error> {
     let mut inputs = Inputs {
         irradiance: view(TextureFormat::Rgba16Float),
         depth: view(TextureFormat::Depth32Float),
-        profile_id: view(TextureFormat::R8Uint),
+        profile_id: Some(view(TextureFormat::R8Uint)),
+        strength: None,
         output: view(TextureFormat::Rgba16Float),
+        viewport: None,
         projection: common::View::perspective(SIZE, 40.0).projection.as_mat4(),
         mm_per_unit: 1.0,
         profiles: vec![Profile::SKIN],
     };
     change(&mut inputs);
+    let frame = ScreenFrame {
+        irradiance: &inputs.irradiance,
+        depth: &inputs.depth,
+        profile_id: inputs.profile_id.as_ref(),
+        strength: inputs.strength.as_ref(),
+        viewport: inputs.viewport,
+        output: &inputs.output,
+        projection: inputs.projection,
+        mm_per_unit: inputs.mm_per_unit,
+        profiles: &inputs.profiles,
+    };
     let gpu = gpu();
     // Whatever gets past the checks must not trip the device's own.
     let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let mut effect = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float)?;
-    let result = effect.prepare(
-        &gpu.device,
-        &ScreenFrame {
-            irradiance: &inputs.irradiance,
-            depth: &inputs.depth,
-            profile_id: &inputs.profile_id,
-            output: &inputs.output,
-            projection: inputs.projection,
-            mm_per_unit: inputs.mm_per_unit,
-            profiles: &inputs.profiles,
-        },
-    );
-    gpu.run(|encoder| effect.render(encoder));
+    let mut exact = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float)?;
+    let mut planned = PlannedScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float)?;
+    let result = exact.prepare(&gpu.device, &frame);
+    let by_plan = planned.prepare(&gpu.device, &gpu.queue, &frame, plan(&inputs.profiles));
+    gpu.run(|encoder| {
+        exact.render(encoder);
+        planned.render(encoder);
+    });
     let error = pollster(scope.pop());
     assert!(error.is_none(), "{error:?}");
+    assert_eq!(result, by_plan);
     result
+}
+
+/// One for as many profiles of skin, or for one where there cannot be any.
+fn plan(profiles: &[Profile]) -> &'static Plan {
+    static ONE: OnceLock<Plan> = OnceLock::new();
+    static ALL: OnceLock<Plan> = OnceLock::new();
+    let (plan, count) = match profiles.len() {
+        16 => (&ALL, 16),
+        _ => (&ONE, 1),
+    };
+    plan.get_or_init(|| Plan::new(&vec![Profile::SKIN; count], 0.01).unwrap())
 }
 
 struct Inputs {
     irradiance: TextureView,
     depth: TextureView,
-    profile_id: TextureView,
+    profile_id: Option<TextureView>,
+    strength: Option<TextureView>,
     output: TextureView,
+    viewport: Option<Viewport>,
     projection: Mat4,
     mm_per_unit: f32,
     profiles: Vec<Profile>,
@@ -104,7 +130,22 @@ fn what_fits_is_taken() {
         1,
     );
     screen(|i| i.irradiance = packed).unwrap();
-    screen(|i| i.profile_id = view(TextureFormat::R32Uint)).unwrap();
+    screen(|i| i.profile_id = Some(view(TextureFormat::R32Uint))).unwrap();
+    screen(|i| i.profile_id = None).unwrap();
+    for strength in [TextureFormat::R8Unorm, TextureFormat::Rgba16Float] {
+        screen(|i| i.strength = Some(view(strength))).unwrap();
+    }
+    for [x, y, width, height] in [[0, 0, 16, 8], [15, 7, 1, 1], [3, 2, 9, 5]] {
+        screen(|i| {
+            i.viewport = Some(Viewport {
+                x,
+                y,
+                width,
+                height,
+            })
+        })
+        .unwrap();
+    }
     screen(|i| i.profiles = vec![Profile::SKIN; 16]).unwrap();
 }
 
@@ -127,7 +168,19 @@ fn what_does_not_fit_is_named() {
     refused("depth: format", |i| i.depth = view(TextureFormat::R8Unorm));
     refused("depth: format", |i| i.depth = view(TextureFormat::R16Float));
     refused("profile_id: format", |i| {
-        i.profile_id = view(TextureFormat::R8Unorm)
+        i.profile_id = Some(view(TextureFormat::R8Unorm))
+    });
+    refused("strength: format", |i| {
+        i.strength = Some(view(TextureFormat::R8Uint))
+    });
+    refused("strength: format", |i| {
+        i.strength = Some(view(TextureFormat::Depth32Float))
+    });
+    refused("strength: size", |i| {
+        i.strength = Some(gpu().target("small", [8, 8], TextureFormat::R8Unorm));
+    });
+    refused("output: got the texture of strength", |i| {
+        i.strength = Some(i.output.clone())
     });
     refused("output: format", |i| {
         i.output = view(TextureFormat::Rgba32Float)
@@ -156,6 +209,21 @@ fn what_does_not_fit_is_named() {
     refused("output: got the texture of irradiance", |i| {
         i.output = i.irradiance.clone()
     });
+    for [x, y, width, height] in [
+        [0, 0, 0, 8],
+        [0, 0, 17, 8],
+        [9, 0, 8, 8],
+        [u32::MAX, 0, 2, 1],
+    ] {
+        let viewport = Viewport {
+            x,
+            y,
+            width,
+            height,
+        };
+        let error = screen(|i| i.viewport = Some(viewport)).unwrap_err();
+        assert_eq!(error.input, "viewport");
+    }
     refused("projection", |i| i.projection = Mat4::ZERO);
     refused("projection", |i| i.projection.x_axis.x = f32::NAN);
     refused("projection", |i| i.projection.x_axis.y = 0.5);
@@ -178,6 +246,104 @@ fn an_output_format_that_cannot_be_drawn_to_is_named() {
         let error = ScreenSpace::new(device, format).err().expect("refused");
         assert_eq!(error.input, "output_format");
         assert!(TextureSpace::new(device, format).is_err());
+    }
+}
+
+#[test]
+fn an_output_format_that_cannot_be_blended_is_named() {
+    let device = &gpu().device;
+    for output in [Output::AddScattered, Output::AddDifference] {
+        assert!(ScreenSpace::new(device, output(TextureFormat::Rgba16Float)).is_ok());
+        let full = output(TextureFormat::Rgba32Float);
+        let errors = [
+            ScreenSpace::new(device, full).err(),
+            PlannedScreenSpace::new(device, full).err(),
+        ];
+        for error in errors {
+            assert_eq!(error.expect("refused").input, "output_format");
+        }
+    }
+}
+
+/// A plan of other profiles than the frame's, and projections that only the exact effect takes.
+#[test]
+fn what_a_plan_cannot_do_is_named() {
+    let gpu = gpu();
+    let views = [
+        TextureFormat::Rgba16Float,
+        TextureFormat::Depth32Float,
+        TextureFormat::Rgba16Float,
+    ]
+    .map(view);
+    let frame = ScreenFrame {
+        irradiance: &views[0],
+        depth: &views[1],
+        profile_id: None,
+        strength: None,
+        viewport: None,
+        output: &views[2],
+        projection: common::View::perspective(SIZE, 40.0).projection.as_mat4(),
+        mm_per_unit: 1.0,
+        profiles: &[Profile::SKIN],
+    };
+    let mut effect = PlannedScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float).unwrap();
+    let mut prepare = |frame: &ScreenFrame, plan: &Plan| {
+        let result = effect.prepare(&gpu.device, &gpu.queue, frame, plan);
+        result.err().map(|error| error.input)
+    };
+    let one = plan(frame.profiles);
+    assert_eq!(prepare(&frame, one), None);
+    let sixteen = plan(&[Profile::SKIN; 16]);
+    assert_eq!(prepare(&frame, sixteen), Some("plan".into()));
+    let mut oblique = frame;
+    oblique.projection.x_axis.z = 0.1;
+    assert_eq!(prepare(&oblique, one), Some("projection".into()));
+    let mut exact = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float).unwrap();
+    exact.prepare(&gpu.device, &oblique).unwrap();
+}
+
+#[test]
+fn a_frame_that_was_refused_leaves_the_one_before() {
+    let gpu = gpu();
+    let light = vec![[0.5f32, 0.25, 0.125, 1.0]; (SIZE[0] * SIZE[1]) as usize];
+    let irradiance = gpu.upload("irradiance", SIZE, TextureFormat::Rgba32Float, &light);
+    let depth = gpu.upload("depth", SIZE, TextureFormat::R32Float, &[0.5f32; 128]);
+    let output = view(TextureFormat::Rgba32Float);
+    let good = ScreenFrame {
+        irradiance: &irradiance,
+        depth: &depth,
+        profile_id: None,
+        strength: None,
+        viewport: None,
+        output: &output,
+        projection: common::View::perspective(SIZE, 40.0).projection.as_mat4(),
+        mm_per_unit: 1.0,
+        profiles: &[Profile::SKIN],
+    };
+    let bad = ScreenFrame {
+        mm_per_unit: -1.0,
+        ..good
+    };
+    let mut exact = ScreenSpace::new(&gpu.device, TextureFormat::Rgba32Float).unwrap();
+    let mut planned = PlannedScreenSpace::new(&gpu.device, TextureFormat::Rgba32Float).unwrap();
+    let plan = plan(good.profiles);
+    exact.prepare(&gpu.device, &good).unwrap();
+    exact.prepare(&gpu.device, &bad).unwrap_err();
+    let prepared = planned.prepare(&gpu.device, &gpu.queue, &good, plan);
+    prepared.unwrap();
+    let refused = planned.prepare(&gpu.device, &gpu.queue, &bad, plan);
+    refused.unwrap_err();
+    for planned_too in [false, true] {
+        gpu.run(|encoder| match planned_too {
+            true => planned.render(encoder),
+            false => exact.render(encoder),
+        });
+        for pixel in gpu.read(&output) {
+            // Constant light stays, as half floats between the passes of a plan.
+            for (a, b) in pixel.iter().zip([0.5, 0.25, 0.125, 1.0]) {
+                assert!((a - b).abs() <= 5e-4, "{pixel:?}");
+            }
+        }
     }
 }
 
@@ -232,7 +398,9 @@ fn sizes_may_change_from_frame_to_frame() {
                 &ScreenFrame {
                     irradiance: &target(TextureFormat::Rgba16Float),
                     depth: &target(TextureFormat::Depth32Float),
-                    profile_id: &target(TextureFormat::R8Uint),
+                    profile_id: Some(&target(TextureFormat::R8Uint)),
+                    strength: None,
+                    viewport: None,
                     output: &target(TextureFormat::Rgba16Float),
                     projection: common::View::perspective(size, 40.0).projection.as_mat4(),
                     mm_per_unit: 1.0,

@@ -334,7 +334,9 @@ fn frames_of_every_size_are_scattered() {
         let frame = ScreenFrame {
             irradiance: &gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &light),
             depth: &gpu.upload("depth", size, TextureFormat::R32Float, &vec![0.5f32; count]),
-            profile_id: &gpu.upload("id", size, TextureFormat::R8Uint, &vec![1u8; count]),
+            profile_id: Some(&gpu.upload("id", size, TextureFormat::R8Uint, &vec![1u8; count])),
+            strength: None,
+            viewport: None,
             output: &output,
             projection: View::orthographic(size, 4.0).projection.as_mat4(),
             mm_per_unit: 1.0,

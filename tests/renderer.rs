@@ -31,7 +31,9 @@ fn screen_space(head: &Head) -> TextureView {
     let frame = ScreenFrame {
         irradiance: &head.renderer.gbuffer.irradiance,
         depth: &head.renderer.gbuffer.depth,
-        profile_id: &head.renderer.gbuffer.profile_id,
+        profile_id: Some(&head.renderer.gbuffer.profile_id),
+        strength: None,
+        viewport: None,
         output: &output,
         projection: head.camera.projection(SIZE),
         mm_per_unit: 1000.0,

@@ -441,7 +441,9 @@ fn two_frames_may_share_a_submission() {
         let frame = ScreenFrame {
             irradiance: &irradiance,
             depth: &depth,
-            profile_id: &profile_id,
+            profile_id: Some(&profile_id),
+            strength: None,
+            viewport: None,
             output,
             projection: view.projection.as_mat4(),
             mm_per_unit: 1.0,

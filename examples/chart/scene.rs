@@ -163,7 +163,9 @@ impl Scene {
         ScreenFrame {
             irradiance: &self.irradiance,
             depth: &self.depth,
-            profile_id: &self.profile_id,
+            profile_id: Some(&self.profile_id),
+            strength: None,
+            viewport: None,
             output,
             projection: self.projection,
             mm_per_unit: self.mm_per_unit,

@@ -316,7 +316,9 @@ fn scatter_screen(
             &ScreenFrame {
                 irradiance,
                 depth,
-                profile_id,
+                profile_id: Some(profile_id),
+                strength: None,
+                viewport: None,
                 output: &output,
                 projection: camera.projection(options.size),
                 mm_per_unit: options.mm_per_unit,

@@ -75,11 +75,20 @@ impl Weights {
             }
             Some(fitted)
         };
+        let mut fitted: Vec<Vec<Row>> = Vec::new();
+        for (i, profile) in profiles.iter().enumerate() {
+            // Several heads may well have the same skin.
+            let rows = match profiles[..i].iter().position(|p| p == profile) {
+                Some(same) => fitted[same].clone(),
+                None => fit(profile)?,
+            };
+            fitted.push(rows);
+        }
         let weights = Self {
             kernels,
             levels: MAX_LEVELS,
             first_octave: first,
-            profiles: profiles.iter().map(fit).collect::<Option<_>>()?,
+            profiles: fitted,
         };
         (weights.predicted_error() <= max_error).then_some(weights)
     }

@@ -4,42 +4,32 @@
 mod passes;
 mod scratch;
 
-use glam::Vec4;
 use wgpu::{
     BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, Queue, Sampler, TextureFormat,
     TextureView,
 };
 
-use crate::gaussian_sum::scratch_view;
+use crate::frame::{Optics, Viewport};
+use crate::gaussian_sum::{begin, scratch_view};
 use crate::plan::Weights;
-use passes::{Compute, Draw, LIGHT, Passes, Shaders, begin};
+use crate::{Output, ScreenFrame};
+use passes::{Compute, Draw, LIGHT, Passes, Shaders};
 use scratch::{DRAW_BYTES, LevelScratch, Scratch, View};
-
-/// Where a frame's pixels are, in mm.
-pub(crate) struct Optics {
-    /// x and y over z of the surface at the corner of the frame, then the part that is not over z.
-    pub origin: Vec4,
-    /// The same for a step of one pixel.
-    pub step: Vec4,
-    /// z = (x·depth + y)/(z·depth + w).
-    pub depth_to_mm: Vec4,
-}
 
 /// What a frame hands over, already checked.
 pub(crate) struct Inputs<'a> {
-    pub irradiance: &'a TextureView,
-    pub depth: &'a TextureView,
-    pub profile_id: &'a TextureView,
-    pub output: &'a TextureView,
+    pub frame: &'a ScreenFrame<'a>,
     pub optics: Optics,
     pub plan: &'a Weights,
 }
 
 /// The passes, and what they need for the frame that was last prepared.
 pub(crate) struct Pyramid {
-    output_format: TextureFormat,
+    output: Output,
     shaders: Shaders,
     linear: Sampler,
+    /// Bound where a frame has no ids.
+    no_id: TextureView,
     planned: Option<Planned>,
     scratch: Option<Scratch>,
     frame: Option<Frame>,
@@ -54,7 +44,8 @@ struct Planned {
 
 /// The groups of one frame.
 struct Frame {
-    inputs: [TextureView; 4],
+    views: Views,
+    viewport: Option<Viewport>,
     mark: BindGroup,
     gather: Vec<BindGroup>,
     pack: BindGroup,
@@ -65,10 +56,20 @@ struct Frame {
     copy: BindGroup,
 }
 
+/// What is bound of a host's.
+#[derive(Clone, PartialEq)]
+struct Views {
+    irradiance: TextureView,
+    depth: TextureView,
+    profile_id: TextureView,
+    strength: TextureView,
+    output: TextureView,
+}
+
 impl Pyramid {
-    pub fn new(device: &Device, output_format: TextureFormat) -> Self {
+    pub fn new(device: &Device, output: Output) -> Self {
         Self {
-            output_format,
+            output,
             shaders: Shaders::new(device),
             linear: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("subsurface linear"),
@@ -76,6 +77,7 @@ impl Pyramid {
                 min_filter: wgpu::FilterMode::Linear,
                 ..Default::default()
             }),
+            no_id: scratch_view(device, "subsurface no id", [1, 1], TextureFormat::R8Uint),
             planned: None,
             scratch: None,
             frame: None,
@@ -84,14 +86,16 @@ impl Pyramid {
 
     /// Uploads what the frame needs; makes anew what a new plan, size or texture asks for.
     pub fn prepare(&mut self, device: &Device, queue: &Queue, inputs: &Inputs) {
-        let size = crate::input::size(inputs.irradiance);
+        let frame = inputs.frame;
+        let viewport = frame.viewport();
+        let size = viewport.size();
         if self.planned.as_ref().is_none_or(|p| p.plan != *inputs.plan) {
             self.scratch = None;
             self.frame = None;
             self.planned = Some(Planned {
                 plan: inputs.plan.clone(),
                 weights: weights(device, inputs.plan),
-                passes: Passes::new(device, &self.shaders, inputs.plan, self.output_format),
+                passes: Passes::new(device, &self.shaders, inputs.plan, self.output),
             });
         }
         let Some(planned) = &self.planned else { return };
@@ -106,22 +110,34 @@ impl Pyramid {
         let view = View {
             origin: optics.origin,
             step: optics.step,
-            depth_to_mm: optics.depth_to_mm,
+            depth_to_mm: optics.depth_to_mm(),
             first_octave: plan.first_octave(),
             rows: plan.row_count() as u32,
             stride: plan.stride() as u32,
             profiles: plan.profiles.len() as u32,
+            first_pixel: viewport.first(),
+            size: size.into(),
+            far: optics.far,
+            has_id: u32::from(frame.profile_id.is_some()),
+            has_strength: u32::from(frame.strength.is_some()),
+            pad: 0,
         };
         queue.write_buffer(&scratch.view, 0, bytemuck::bytes_of(&view));
-        let views = [
-            inputs.irradiance,
-            inputs.depth,
-            inputs.profile_id,
-            inputs.output,
-        ];
-        let same = |f: &Frame| f.inputs.iter().zip(views).all(|(a, b)| a == b);
-        if !self.frame.as_ref().is_some_and(same) {
-            self.frame = Some(Frame::new(device, &self.linear, planned, scratch, views));
+        let views = Views {
+            irradiance: frame.irradiance.clone(),
+            depth: frame.depth.clone(),
+            profile_id: frame.profile_id.unwrap_or(&self.no_id).clone(),
+            // Not looked at where there is none.
+            strength: frame.strength.unwrap_or(frame.irradiance).clone(),
+            output: frame.output.clone(),
+        };
+        match &mut self.frame {
+            Some(made) if made.views == views => made.viewport = frame.viewport,
+            made => {
+                let linear = &self.linear;
+                let groups = Frame::new(device, linear, planned, scratch, views, frame.viewport);
+                *made = Some(groups);
+            }
         }
     }
 
@@ -156,7 +172,7 @@ impl Pyramid {
         }
         {
             let targets = [&base.light, &base.shape];
-            let mut pass = begin(encoder, "subsurface pack", &targets);
+            let mut pass = begin(encoder, "subsurface pack", &targets, false);
             over_tiles(&mut pass, passes.pack.each_ref(), &frame.pack, base);
         }
         forget_tiles(encoder, base);
@@ -168,21 +184,26 @@ impl Pyramid {
         }
         for (group, level) in frame.halve.iter().zip(coarser) {
             let targets = [&level.light, &level.shape];
-            let mut pass = begin(encoder, "subsurface halve", &targets);
+            let mut pass = begin(encoder, "subsurface halve", &targets, false);
             over_tiles(&mut pass, passes.halve.each_ref(), group, level);
         }
         for l in (1..scratch.levels.len()).rev() {
             let (group, level) = (&frame.level[l - 1], &scratch.levels[l]);
-            let mut pass = begin(encoder, "subsurface level", &[scratch.mean(l)]);
+            let mut pass = begin(encoder, "subsurface level", &[scratch.mean(l)], false);
             let [x, y] = level.size.map(|s| s as f32);
             pass.set_viewport(0.0, 0.0, x, y, 0.0, 1.0);
             over_tiles(&mut pass, passes.level.each_ref(), group, level);
         }
-        let output = &frame.inputs[3];
-        let mut pass = begin(encoder, "subsurface frame", &[output]);
-        pass.set_pipeline(&passes.copy.pipeline);
-        pass.set_bind_group(0, &frame.copy, &[]);
-        pass.draw(0..3, 0..1);
+        let keeps = self.output.adds() || frame.viewport.is_some();
+        let mut pass = begin(encoder, "subsurface frame", &[&frame.views.output], keeps);
+        if let Some(viewport) = frame.viewport {
+            viewport.apply(&mut pass);
+        }
+        if !self.output.is_difference() {
+            pass.set_pipeline(&passes.copy.pipeline);
+            pass.set_bind_group(0, &frame.copy, &[]);
+            pass.draw(0..3, 0..1);
+        }
         over_tiles(&mut pass, passes.frame.each_ref(), &frame.frame, base);
     }
 }
@@ -236,12 +257,19 @@ impl Frame {
         linear: &Sampler,
         planned: &Planned,
         scratch: &Scratch,
-        views: [&TextureView; 4],
+        views: Views,
+        viewport: Option<Viewport>,
     ) -> Self {
         let Planned {
             weights, passes, ..
         } = planned;
-        let [irradiance, depth, profile_id, _] = views;
+        let Views {
+            irradiance,
+            depth,
+            profile_id,
+            strength,
+            ..
+        } = &views;
         use wgpu::BindingResource::{Sampler, TextureView as Texture};
         let group = |layout: &BindGroupLayout, entries: &[(u32, wgpu::BindingResource)]| {
             let entries: Vec<_> = entries
@@ -267,7 +295,7 @@ impl Frame {
                 Some(next) => (&next.shape, scratch.mean(l + 1)),
                 None => (&levels[l].shape, &none),
             };
-            let entries = [
+            let mut entries = vec![
                 (0, view.clone()),
                 (1, levels[l].settings.as_entire_binding()),
                 (2, levels[l].list.as_entire_binding()),
@@ -278,6 +306,9 @@ impl Frame {
                 (10, Texture(shape)),
                 (12, Sampler(linear)),
             ];
+            if l == 0 {
+                entries.push((4, Texture(strength)));
+            }
             group(&draw.layout, &entries)
         };
         let gather = |l: usize| {
@@ -309,7 +340,7 @@ impl Frame {
             group(&passes.halve[0].layout, &entries)
         };
         Self {
-            inputs: views.map(Clone::clone),
+            viewport,
             mark: group(
                 &passes.mark.layout,
                 &[
@@ -339,6 +370,7 @@ impl Frame {
                 .collect(),
             frame: blur(&passes.frame[0], 0),
             copy: group(&passes.copy.layout, &[(4, Texture(irradiance))]),
+            views: views.clone(),
         }
     }
 }
@@ -393,7 +425,9 @@ mod tests {
             let frame = ScreenFrame {
                 irradiance: &light,
                 depth: &depth,
-                profile_id: &gpu.upload("id", size, TextureFormat::R8Uint, &vec![id; count]),
+                profile_id: Some(&gpu.upload("id", size, TextureFormat::R8Uint, &vec![id; count])),
+                strength: None,
+                viewport: None,
                 output: &output,
                 // A facing plane, 4 pixels a millimetre.
                 projection: glam::Mat4::from_diagonal(glam::Vec4::new(

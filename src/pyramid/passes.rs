@@ -2,9 +2,10 @@
 
 use wgpu::{
     BindGroupLayout, BindingType, BufferBindingType, Device, RenderPipeline, ShaderModule,
-    ShaderStages, TextureFormat, TextureSampleType, TextureView,
+    ShaderStages, TextureFormat, TextureSampleType,
 };
 
+use crate::Output;
 use crate::plan::{Kinds, Shape, Weights};
 
 /// Format of light and of means: linear filters may read it.
@@ -63,6 +64,10 @@ impl Shaders {
     }
 }
 
+/// Bindings of the blurs; the frame's know of the strength.
+const LEVEL: [u32; 9] = [0, 1, 2, 3, 7, 8, 9, 10, 12];
+const FRAME: [u32; 10] = [0, 1, 2, 3, 4, 7, 8, 9, 10, 12];
+
 /// All passes; those over tiles for the simple ones and for the others.
 pub(super) struct Passes {
     pub mark: Compute,
@@ -75,13 +80,13 @@ pub(super) struct Passes {
 }
 
 impl Passes {
-    pub fn new(device: &Device, shaders: &Shaders, plan: &Weights, output: TextureFormat) -> Self {
+    pub fn new(device: &Device, shaders: &Shaders, plan: &Weights, output: Output) -> Self {
         let compute = |entry, bindings: &[u32]| {
             let entries: Vec<_> = bindings.iter().map(|b| tiles_entry(*b)).collect();
             Compute::new(device, &shaders.tiles, entry, &entries)
         };
         let both = |draw: &dyn Fn(f64) -> Draw| [draw(0.0), draw(1.0)];
-        let blur = |entry, target: wgpu::ColorTargetState, kinds: &Kinds| {
+        let blur = |entry, bindings: &[u32], target: wgpu::ColorTargetState, kinds: &Kinds| {
             let flag = |on| f64::from(u8::from(on));
             [(0, "vs_corner"), (1, "vs_tile")].map(|(careful, vertex)| {
                 let constants = [
@@ -90,22 +95,19 @@ impl Passes {
                     ("THIRTEEN", flag(kinds.shape == Shape::Thirteen)),
                     ("SQUARE", flag(kinds.square_px2.is_some())),
                     ("FINEST", flag(entry == "fs_frame")),
+                    ("DIFFERENCE", flag(output.adds())),
                 ];
                 Draw::new(
                     device,
                     &shaders.blurs[careful],
                     [vertex, entry],
-                    &[0, 1, 2, 3, 7, 8, 9, 10, 12],
+                    bindings,
                     &[Some(target.clone())],
                     &constants,
                 )
             })
         };
         let surface = [Some(LIGHT.into()), Some(SHAPE.into())];
-        let rgb = wgpu::ColorTargetState {
-            write_mask: wgpu::ColorWrites::COLOR,
-            ..output.into()
-        };
         Self {
             mark: compute("mark", &[0, 1, 2, 3, 4]),
             gather: compute("gather", &[5, 6, 7, 8, 9, 10, 11, 12]),
@@ -129,14 +131,19 @@ impl Passes {
                     &[("CAREFUL", careful)],
                 )
             }),
-            level: blur("fs_level", LIGHT.into(), &plan.kernels.coarse),
-            frame: blur("fs_frame", rgb, &plan.kernels.fine),
+            level: blur("fs_level", &LEVEL, LIGHT.into(), &plan.kernels.coarse),
+            frame: blur(
+                "fs_frame",
+                &FRAME,
+                output.target(wgpu::ColorWrites::COLOR),
+                &plan.kernels.fine,
+            ),
             copy: Draw::new(
                 device,
                 &shaders.copy,
                 ["vs_frame", "fs_copy"],
                 &[4],
-                &[Some(output.into())],
+                &[Some(output.target(wgpu::ColorWrites::ALL))],
                 &[],
             ),
         }
@@ -307,29 +314,4 @@ impl Draw {
         });
         Self { layout, pipeline }
     }
-}
-
-/// Begins a pass over cleared targets: what lies outside of the tiles is no surface, and dark.
-pub(super) fn begin<'a>(
-    encoder: &'a mut wgpu::CommandEncoder,
-    label: &str,
-    targets: &[&TextureView],
-) -> wgpu::RenderPass<'a> {
-    let attachment = |view| {
-        Some(wgpu::RenderPassColorAttachment {
-            view,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations {
-                load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                store: wgpu::StoreOp::Store,
-            },
-        })
-    };
-    let attachments: Vec<_> = targets.iter().map(|view| attachment(*view)).collect();
-    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some(label),
-        color_attachments: &attachments,
-        ..Default::default()
-    })
 }

@@ -22,6 +22,12 @@ pub(super) struct View {
     pub rows: u32,
     pub stride: u32,
     pub profiles: u32,
+    pub first_pixel: UVec2,
+    pub size: UVec2,
+    pub far: f32,
+    pub has_id: u32,
+    pub has_strength: u32,
+    pub pad: u32,
 }
 
 /// `Blur` of surface.wgsl.
@@ -224,7 +230,12 @@ mod tests {
                 first_octave,
                 rows,
                 stride,
-                profiles
+                profiles,
+                first_pixel,
+                size,
+                far,
+                has_id,
+                has_strength
             }
         );
         assert_layout!(

@@ -193,7 +193,9 @@ impl GBuffer {
         let frame = ScreenFrame {
             irradiance: &gpu.upload("irradiance", size, full, &irradiance),
             depth: &gpu.upload("depth", size, TextureFormat::R32Float, &depth),
-            profile_id: &gpu.upload("profile id", size, TextureFormat::R8Uint, &id),
+            profile_id: Some(&gpu.upload("profile id", size, TextureFormat::R8Uint, &id)),
+            strength: None,
+            viewport: None,
             output: &output,
             projection: self.view.projection.as_mat4(),
             mm_per_unit: 1.0,

@@ -60,9 +60,17 @@ impl Packed {
     }
 
     pub fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<Inputs, Error> {
+        let (Some(profile_id), None, None) = (frame.profile_id, frame.strength, frame.viewport)
+        else {
+            return Err(Error::new(
+                "frame",
+                "no profile_id, or a strength or viewport",
+                "ids alone: rivals know no more",
+            ));
+        };
         let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("rivals frame"),
-            contents: bytemuck::bytes_of(&uniform(frame)?),
+            contents: bytemuck::bytes_of(&uniform(frame, profile_id)?),
             usage: wgpu::BufferUsages::UNIFORM,
         });
         let views = scratch(
@@ -78,7 +86,7 @@ impl Packed {
                 uniform.as_entire_binding(),
                 wgpu::BindingResource::TextureView(frame.irradiance),
                 wgpu::BindingResource::TextureView(frame.depth),
-                wgpu::BindingResource::TextureView(frame.profile_id),
+                wgpu::BindingResource::TextureView(profile_id),
             ],
         );
         self.prepared = Some((group, frame.output.clone()));
@@ -103,13 +111,13 @@ impl Packed {
 
 /// `frame` of the shaders. With clip z and w linear in view z, depth d = (P₂₂z + P₂₃)/(P₃₂z + P₃₃)
 /// solves to z = (P₂₃ − d·P₃₃)/(d·P₃₂ − P₂₂), and a pixel is 2|w|/(W·P₀₀) wide.
-fn uniform(frame: &ScreenFrame) -> Result<[Vec4; 2], Error> {
+fn uniform(frame: &ScreenFrame, profile_id: &wgpu::TextureView) -> Result<[Vec4; 2], Error> {
     let p = frame.projection;
     let mm = frame.mm_per_unit;
     let size = size(frame.irradiance);
     for (input, view) in [
         ("depth", frame.depth),
-        ("profile_id", frame.profile_id),
+        ("profile_id", profile_id),
         ("output", frame.output),
     ] {
         let [width, height] = self::size(view);

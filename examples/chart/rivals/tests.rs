@@ -94,7 +94,9 @@ impl View {
         let frame = ScreenFrame {
             irradiance: &gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &irradiance),
             depth: &gpu.upload("depth", size, TextureFormat::R32Float, &depth),
-            profile_id: &gpu.upload("profile id", size, TextureFormat::R8Uint, &id),
+            profile_id: Some(&gpu.upload("profile id", size, TextureFormat::R8Uint, &id)),
+            strength: None,
+            viewport: None,
             output: &output,
             projection: self.projection,
             mm_per_unit: 1.0,

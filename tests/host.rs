@@ -1,0 +1,437 @@
+//! What a host may ask for beyond a frame of its own: a part of a target, ids or none, less of the
+//! effect, sums in place; by both effects.
+
+mod common;
+
+use std::sync::OnceLock;
+
+use common::{View, gpu, plane, sphere};
+use glam::{DMat4, DVec3, DVec4, Mat4};
+use subsurface::truth::closed_form::step;
+use subsurface::wgpu::{TextureFormat, TextureView};
+use subsurface::{Output, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace, Viewport};
+
+const SIZE: [u32; 2] = [96, 80];
+const HALF: TextureFormat = TextureFormat::Rgba16Float;
+
+/// A plan of skin.
+fn plan() -> &'static Plan {
+    static PLAN: OnceLock<Plan> = OnceLock::new();
+    PLAN.get_or_init(|| Plan::new(&[Profile::SKIN], 0.01).unwrap())
+}
+
+/// A sphere before nothing, in half floats.
+struct Scene {
+    size: [u32; 2],
+    irradiance: Vec<[f32; 4]>,
+    depth: Vec<f32>,
+    id: Vec<u8>,
+    projection: Mat4,
+}
+
+/// What a host asks for beyond a frame of its own.
+#[derive(Default)]
+struct Asked<'a> {
+    no_ids: bool,
+    strength: Option<&'a TextureView>,
+    viewport: Option<Viewport>,
+}
+
+/// At a corner of a picture that has other things all around.
+const PLACE: Viewport = Viewport {
+    x: 40,
+    y: 24,
+    width: SIZE[0],
+    height: SIZE[1],
+};
+
+impl Scene {
+    fn new() -> Self {
+        let view = View::perspective(SIZE, 40.0);
+        let light = DVec3::new(0.8, 0.3, 0.5).normalize();
+        let seen = view.shoot(sphere(9.0, 36.0, |n| {
+            DVec3::new(1.0, 0.5, 0.25) * n.dot(light).max(0.0)
+        }));
+        let hits = &seen.hits;
+        let color = |e: DVec3| {
+            let half = |x: f64| half::f16::from_f64(x).to_f32();
+            [half(e.x), half(e.y), half(e.z), 0.5]
+        };
+        let clip = |p: DVec3| view.projection * p.extend(1.0);
+        Self {
+            size: SIZE,
+            irradiance: hits
+                .iter()
+                .map(|h| color(h.map_or(DVec3::splat(0.25), |h| h.irradiance)))
+                .collect(),
+            depth: hits
+                .iter()
+                .map(|h| h.map_or(0.0, |h| (clip(h.point).z / clip(h.point).w) as f32))
+                .collect(),
+            id: hits.iter().map(|h| u8::from(h.is_some())).collect(),
+            projection: view.projection.as_mat4(),
+        }
+    }
+
+    /// The same in a larger picture, full of skin that would bleed in.
+    fn within_more(&self) -> Self {
+        let size = [160, 128];
+        let at = |x: u32, y: u32| {
+            let (x, y) = (x.checked_sub(PLACE.x)?, y.checked_sub(PLACE.y)?);
+            (x < SIZE[0] && y < SIZE[1]).then_some((y * SIZE[0] + x) as usize)
+        };
+        let mut more = Self {
+            size,
+            irradiance: Vec::new(),
+            depth: Vec::new(),
+            id: Vec::new(),
+            projection: self.projection,
+        };
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let i = at(x, y);
+                more.irradiance
+                    .push(i.map_or([8.0, 8.0, 8.0, 1.0], |i| self.irradiance[i]));
+                more.depth.push(i.map_or(0.3, |i| self.depth[i]));
+                more.id.push(i.map_or(1, |i| self.id[i]));
+            }
+        }
+        more
+    }
+
+    /// What an effect leaves in a target that held `before`.
+    fn scatter(
+        &self,
+        planned: bool,
+        output: Output,
+        before: &[[f32; 4]],
+        asked: Asked,
+    ) -> Vec<[f32; 4]> {
+        let gpu = gpu();
+        let to = gpu.target("output", self.size, HALF);
+        let held = gpu.upload("before", self.size, HALF, &halves(before));
+        gpu.run(|encoder| {
+            let [from, to] = [&held, &to].map(|view| view.texture().as_image_copy());
+            encoder.copy_texture_to_texture(from, to, held.texture().size());
+        });
+        let id = gpu.upload("id", self.size, TextureFormat::R8Uint, &self.id);
+        let frame = ScreenFrame {
+            irradiance: &gpu.upload("irradiance", self.size, HALF, &halves(&self.irradiance)),
+            depth: &gpu.upload("depth", self.size, TextureFormat::R32Float, &self.depth),
+            profile_id: (!asked.no_ids).then_some(&id),
+            strength: asked.strength,
+            viewport: asked.viewport,
+            output: &to,
+            projection: self.projection,
+            mm_per_unit: 1.0,
+            profiles: &[Profile::SKIN],
+        };
+        if planned {
+            let mut effect = PlannedScreenSpace::new(&gpu.device, output).unwrap();
+            effect
+                .prepare(&gpu.device, &gpu.queue, &frame, plan())
+                .unwrap();
+            gpu.run(|encoder| effect.render(encoder));
+        } else {
+            let mut effect = ScreenSpace::new(&gpu.device, output).unwrap();
+            effect.prepare(&gpu.device, &frame).unwrap();
+            gpu.run(|encoder| effect.render(encoder));
+        }
+        gpu.read(&to)
+    }
+
+    fn scattered(&self, planned: bool, asked: Asked) -> Vec<[f32; 4]> {
+        let nothing = vec![[0.0; 4]; self.depth.len()];
+        self.scatter(planned, HALF.into(), &nothing, asked)
+    }
+}
+
+fn halves(pixels: &[[f32; 4]]) -> Vec<[u16; 4]> {
+    let bits = |x: f32| half::f16::from_f32(x).to_bits();
+    pixels.iter().map(|p| p.map(bits)).collect()
+}
+
+fn largest_difference(a: &[[f32; 4]], b: &[[f32; 4]]) -> f32 {
+    let channels = a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b));
+    channels.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+#[test]
+fn a_viewport_is_a_frame_of_its_own() {
+    let alone = Scene::new();
+    let more = alone.within_more();
+    let around = [3.0, 2.0, 1.0, 0.5];
+    for planned in [false, true] {
+        let truth = alone.scattered(planned, Asked::default());
+        assert!(largest_difference(&truth, &alone.irradiance) > 0.02);
+        let before = vec![around; more.depth.len()];
+        let in_place = Asked {
+            viewport: Some(PLACE),
+            ..Asked::default()
+        };
+        let out = more.scatter(planned, HALF.into(), &before, in_place);
+        for (i, pixel) in out.iter().enumerate() {
+            let (x, y) = (i as u32 % more.size[0], i as u32 / more.size[0]);
+            let inside = x >= PLACE.x
+                && y >= PLACE.y
+                && x < PLACE.x + PLACE.width
+                && y < PLACE.y + PLACE.height;
+            let expected = match inside {
+                true => truth[((y - PLACE.y) * SIZE[0] + x - PLACE.x) as usize],
+                false => around,
+            };
+            assert_eq!(*pixel, expected, "planned: {planned}, at {x}, {y}");
+        }
+    }
+}
+
+#[test]
+fn without_ids_all_before_the_far_plane_scatters() {
+    let scene = Scene::new();
+    for planned in [false, true] {
+        let no_ids = Asked {
+            no_ids: true,
+            ..Asked::default()
+        };
+        let by_id = scene.scattered(planned, Asked::default());
+        let by_depth = scene.scattered(planned, no_ids);
+        assert_eq!(by_id, by_depth, "planned: {planned}");
+    }
+}
+
+#[test]
+fn strength_says_how_much() {
+    let scene = Scene::new();
+    // A third each of none, half and all.
+    let share = |i: usize| [0u8, 128, 255][(i % SIZE[0] as usize) / 32];
+    let strength: Vec<u8> = (0..scene.depth.len()).map(share).collect();
+    let strength = gpu().upload("strength", scene.size, TextureFormat::R8Unorm, &strength);
+    for planned in [false, true] {
+        let shared = Asked {
+            strength: Some(&strength),
+            ..Asked::default()
+        };
+        let all = scene.scattered(planned, Asked::default());
+        let some = scene.scattered(planned, shared);
+        for (i, pixel) in some.iter().enumerate() {
+            let before = scene.irradiance[i];
+            match share(i) {
+                0 => assert_eq!(*pixel, before, "planned: {planned}, pixel {i}"),
+                255 => assert_eq!(*pixel, all[i], "planned: {planned}, pixel {i}"),
+                half => {
+                    let t = f32::from(half) / 255.0;
+                    for c in 0..3 {
+                        let expected = before[c] + t * (all[i][c] - before[c]);
+                        // Two roundings to half floats, of steps of .001 at 1.
+                        assert!((pixel[c] - expected).abs() <= 0.001);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn sums_in_place_are_what_a_final_pass_would_add() {
+    let scene = Scene::new();
+    let specular: Vec<[f32; 4]> = (0..scene.depth.len())
+        .map(|i| [i as f32 % 7.0 / 16.0, 0.25, 0.5, 0.75])
+        .collect();
+    let plus = |a: &[[f32; 4]], b: &[[f32; 4]]| -> Vec<[f32; 4]> {
+        let sum = |(a, b): (&[f32; 4], &[f32; 4])| [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3]];
+        a.iter().zip(b).map(sum).collect()
+    };
+    for planned in [false, true] {
+        let scattered = scene.scattered(planned, Asked::default());
+        let expected = plus(&specular, &scattered);
+        let lit = plus(&specular, &scene.irradiance);
+        let added = scene.scatter(
+            planned,
+            Output::AddScattered(HALF),
+            &specular,
+            Asked::default(),
+        );
+        let changed = scene.scatter(planned, Output::AddDifference(HALF), &lit, Asked::default());
+        // Up to three roundings of half floats, or truncations, of steps of .001 from 1 to 2.
+        let worst = [&added, &changed].map(|out| largest_difference(out, &expected));
+        println!("planned: {planned}, off by {worst:?}");
+        assert!(worst[0].max(worst[1]) <= 0.003, "{worst:?}");
+        // What does not scatter is not touched.
+        for (i, _) in scene.id.iter().enumerate().filter(|(_, id)| **id == 0) {
+            assert_eq!(
+                changed[i].map(f32::to_bits),
+                bits_of_half(lit[i]),
+                "planned: {planned}"
+            );
+        }
+    }
+}
+
+fn bits_of_half(pixel: [f32; 4]) -> [u32; 4] {
+    pixel.map(|x| half::f16::from_f32(x).to_f32().to_bits())
+}
+
+/// A camera of any kind: a field of view in degrees or millimetres seen, pixels, and the mm of a unit.
+struct Camera {
+    name: &'static str,
+    size: [u32; 2],
+    /// Clip from view space in mm.
+    projection: DMat4,
+    distance_mm: f64,
+    mm_per_unit: f64,
+    viewport: Option<Viewport>,
+}
+
+/// A strip of a frame that is `whole` high, so that large frames need not be drawn whole.
+fn cameras() -> Vec<Camera> {
+    // As wide on the plane as 5 px/mm make it.
+    let strip = [256u32, 64];
+    let px_per_mm = 5.0;
+    let perspective = |whole: f64, degrees: f64, z: f64, offset: f64, shift: f64| {
+        let f = 1.0 / (degrees.to_radians() / 2.0).tan();
+        // Pixels of the whole frame over those of the strip.
+        let (sx, sy) = (whole / f64::from(strip[0]), whole / f64::from(strip[1]));
+        let projection = DMat4::from_cols(
+            DVec4::new(f * sx, 0.0, 0.0, 0.0),
+            DVec4::new(0.0, f * sy, 0.0, 0.0),
+            DVec4::new(shift, 0.0, z, -1.0),
+            DVec4::new(0.0, 0.0, offset, 0.0),
+        );
+        (projection, f * whole / 2.0 / px_per_mm)
+    };
+    let (near, far) = (1.0, 10_000.0);
+    let mut cameras = Vec::new();
+    let mut add = |name, (projection, distance_mm): (DMat4, f64), mm_per_unit, viewport| {
+        cameras.push(Camera {
+            name,
+            size: strip,
+            projection,
+            distance_mm,
+            mm_per_unit,
+            viewport,
+        });
+    };
+    let infinite = |whole, degrees| perspective(whole, degrees, 0.0, near, 0.0);
+    add("10°, 720p", infinite(720.0, 10.0), 1.0, None);
+    add("110°, 720p", infinite(720.0, 110.0), 1.0, None);
+    add("10°, 4K", infinite(2160.0, 10.0), 1.0, None);
+    add("110°, 4K", infinite(2160.0, 110.0), 1.0, None);
+    add("units of 1 µm", infinite(1080.0, 40.0), 1e-3, None);
+    add("units of 1 m", infinite(1080.0, 40.0), 1e3, None);
+    add(
+        "off centre",
+        perspective(1080.0, 40.0, 0.0, near, 0.2),
+        1.0,
+        None,
+    );
+    let range = far - near;
+    let forward = perspective(1080.0, 40.0, -far / range, -far * near / range, 0.0);
+    add("forward", forward, 1.0, None);
+    let reversed = perspective(1080.0, 40.0, near / range, far * near / range, 0.0);
+    add("reversed", reversed, 1.0, None);
+    add(
+        "forward infinite",
+        perspective(1080.0, 40.0, -1.0, -near, 0.0),
+        1.0,
+        None,
+    );
+    let orthographic = View::orthographic(strip, px_per_mm).projection;
+    add("orthographic", (orthographic, 100.0), 1.0, None);
+    let corner = Viewport {
+        x: 31,
+        y: 17,
+        width: strip[0],
+        height: strip[1],
+    };
+    add("viewport", infinite(1080.0, 40.0), 1.0, Some(corner));
+    cameras
+}
+
+impl Camera {
+    /// Standard deviation of red across a line of 1 mm, in mm.
+    fn line_width_mm(&self, planned: bool) -> f64 {
+        let view = View {
+            size: self.size,
+            projection: self.projection,
+        };
+        // What is off centre is looked at where it is.
+        let middle = view.ray(glam::DVec2::new(128.0, 32.0));
+        let x0 = (middle.0 + middle.1 * self.distance_mm).x;
+        let seen = view.shoot(plane(DVec3::Z, self.distance_mm, |p| {
+            let x = p.x - x0;
+            DVec3::splat(step(x + 0.5, 0.04) - step(x - 0.5, 0.04))
+        }));
+        let from_units = DMat4::from_scale(DVec3::splat(self.mm_per_unit));
+        let target = match self.viewport {
+            Some(v) => [v.x + v.width + 5, v.y + v.height + 9],
+            None => self.size,
+        };
+        let first = self.viewport.map_or([0, 0], |v| [v.x, v.y]);
+        let gpu = gpu();
+        let mut irradiance = vec![[1.0f32; 4]; (target[0] * target[1]) as usize];
+        let mut depth = vec![0.5f32; irradiance.len()];
+        let mut places = Vec::new();
+        for (i, hit) in seen.hits.iter().enumerate() {
+            let hit = hit.expect("a plane");
+            let (x, y) = (i as u32 % self.size[0], i as u32 / self.size[0]);
+            let at = ((y + first[1]) * target[0] + x + first[0]) as usize;
+            let e = hit.irradiance.as_vec3();
+            irradiance[at] = [e.x, e.y, e.z, 1.0];
+            let clip = self.projection * hit.point.extend(1.0);
+            depth[at] = (clip.z / clip.w) as f32;
+            if y == self.size[1] / 2 {
+                places.push((at, hit.point.x));
+            }
+        }
+        let full = TextureFormat::Rgba32Float;
+        let output = gpu.target("output", target, full);
+        let frame = ScreenFrame {
+            irradiance: &gpu.upload("irradiance", target, full, &irradiance),
+            depth: &gpu.upload("depth", target, TextureFormat::R32Float, &depth),
+            profile_id: None,
+            strength: None,
+            viewport: self.viewport,
+            output: &output,
+            projection: (self.projection * from_units).as_mat4(),
+            mm_per_unit: self.mm_per_unit as f32,
+            profiles: &[Profile::SKIN],
+        };
+        if planned {
+            let mut effect = PlannedScreenSpace::new(&gpu.device, full).unwrap();
+            effect
+                .prepare(&gpu.device, &gpu.queue, &frame, plan())
+                .unwrap();
+            gpu.run(|encoder| effect.render(encoder));
+        } else {
+            let mut effect = ScreenSpace::new(&gpu.device, full).unwrap();
+            effect.prepare(&gpu.device, &frame).unwrap();
+            gpu.run(|encoder| effect.render(encoder));
+        }
+        let out = gpu.read(&output);
+        let moment = |f: &dyn Fn(f64) -> f64| -> f64 {
+            let parts = places.iter().map(|(i, x)| f64::from(out[*i][0]) * f(*x));
+            parts.sum()
+        };
+        let mass = moment(&|_| 1.0);
+        let mean = moment(&|x| x) / mass;
+        (moment(&|x| (x - mean) * (x - mean)) / mass).sqrt()
+    }
+}
+
+#[test]
+fn a_line_has_its_width_in_mm_through_every_camera() {
+    for planned in [false, true] {
+        let cameras = cameras();
+        let widths = cameras.iter().map(|c| c.line_width_mm(planned));
+        let widths: Vec<f64> = widths.collect();
+        for (camera, width) in cameras.iter().zip(&widths) {
+            println!("planned: {planned}, {}: {width:.4} mm", camera.name);
+        }
+        let least = widths.iter().copied().fold(f64::MAX, f64::min);
+        let most = widths.iter().copied().fold(0.0, f64::max);
+        assert!(
+            most / least <= 1.01,
+            "planned: {planned}: {least} to {most} mm"
+        );
+    }
+}
