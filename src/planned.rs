@@ -14,7 +14,7 @@ use crate::{Error, Output, Plan, ScreenFrame, ScreenSpace};
 ///
 /// Blurs run over the tiles that hold skin and their neighbours alone, which the GPU finds; marking,
 /// clearing and the copy of what does not scatter go over the frame. Between passes light is half
-/// floats, and held at their largest, 65504. The projection is right-handed. Views that share a
+/// floats, and held at their largest, 65504. View space is right-handed. Views that share a
 /// submission need an effect each, since the numbers of a frame are uploaded when it is prepared. A
 /// frame of the same size, textures and plan as the one before makes nothing anew.
 ///
@@ -93,6 +93,13 @@ impl PlannedScreenSpace {
                 "projection",
                 format!("{}", frame.projection),
                 "depth that does not depend on x and y",
+            ));
+        }
+        if w.z > 0.0 {
+            return Err(Error::new(
+                "projection",
+                format!("{}", frame.projection),
+                "a right-handed view space, in front of the camera along -Z",
             ));
         }
         let inputs = Inputs {

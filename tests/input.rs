@@ -298,8 +298,12 @@ fn what_a_plan_cannot_do_is_named() {
     let mut oblique = frame;
     oblique.projection.x_axis.z = 0.1;
     assert_eq!(prepare(&oblique, one), Some("projection".into()));
+    let mut left_handed = frame;
+    left_handed.projection.z_axis *= -1.0;
+    assert_eq!(prepare(&left_handed, one), Some("projection".into()));
     let mut exact = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float).unwrap();
     exact.prepare(&gpu.device, &oblique).unwrap();
+    exact.prepare(&gpu.device, &left_handed).unwrap();
 }
 
 #[test]
