@@ -181,7 +181,12 @@ fn distance2(a: vec3f, b: vec3f) -> f32 {
     return dot(d, d);
 }
 
-// E·A and A.
+// Whether light is a number. By its bits, since compilers may take for granted that it is.
+fn is_finite(light: vec3f) -> bool {
+    return all((bitcast<vec3u>(light) & vec3u(0x7f800000u)) != vec3u(0x7f800000u));
+}
+
+// E·A and A; nothing where the light is no number, so that it goes no further.
 @fragment
 fn fs_source(vertex: Vertex) -> @location(0) vec4f {
     let pixel = vec2i(vertex.position.xy);
@@ -189,8 +194,12 @@ fn fs_source(vertex: Vertex) -> @location(0) vec4f {
     if here.profile == 0u {
         return vec4f(0.0);
     }
+    let light = irradiance_at(pixel).rgb;
+    if !is_finite(light) {
+        return vec4f(0.0);
+    }
     let area = metric(pixel, here).area;
-    return vec4f(irradiance_at(pixel).rgb * area, area);
+    return vec4f(light * area, area);
 }
 
 // First pass: along the row, unnormalised, so that the area enters once.

@@ -33,6 +33,11 @@ fn tangent(forward: f32, backward: f32, mm: f32) -> f32 {
     return select(0.0, dz / mm, abs(dz) < 40.0 * mm);
 }
 
+// Whether light is a number. By its bits, since compilers may take for granted that it is.
+fn is_finite(light: vec3f) -> bool {
+    return all((bitcast<vec3u>(light) & vec3u(0x7f800000u)) != vec3u(0x7f800000u));
+}
+
 @fragment
 fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     let pixel = vec2i(at.xy);
@@ -74,8 +79,9 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     let shape = Shape(id, z, vec2f(tangent(east, west, mm.x), tangent(south, north, mm.y)));
     let plane = plane_of(pixel, shape);
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
-    // What is packed is half floats, which end there.
-    let light = min(textureLoad(irradiance, pixel_of_host, 0).rgb, vec3f(65504.0));
+    let light = textureLoad(irradiance, pixel_of_host, 0).rgb;
     let sines = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);
-    return Surface(half_floats(vec4f(light, area)), packed(id, z, sines));
+    // Light that is no number goes no further. What is packed is half floats, which end there.
+    let packed_light = select(vec4f(0.0), vec4f(min(light, vec3f(65504.0)), area), is_finite(light));
+    return Surface(half_floats(packed_light), packed(id, z, sines));
 }
