@@ -39,6 +39,7 @@ impl Skin {
             irradiance: &frame.irradiance,       // linear, without albedo
             depth: &frame.depth,                 // as the projection wrote it
             profile_id: Some(&frame.profile_id), // 1 on skin, 0 elsewhere
+            normal: None,
             strength: None,
             viewport: None,
             output: &frame.scattered, // multiply this one by the albedo

@@ -15,6 +15,9 @@ struct Settings {
     // The mm between neighbouring pixels of a surface that faces the camera, at view depth z:
     // |x + y·z| along a row, |z + w·z| along a column. Zero: as far as the surface itself says.
     spacing: vec4f,
+    // x and y over z at the corner of the viewport, and what a pixel adds.
+    rays: vec4f,
+    normals: Normals,
     mm_per_unit: f32,
     // Pixels to which the result is carried past the edge of the surface.
     gutter: i32,
@@ -37,6 +40,7 @@ struct Settings {
 @group(0) @binding(5) var sum: texture_2d<f32>;
 // How much a pixel takes of its scattered light.
 @group(0) @binding(6) var strength: texture_2d<f32>;
+@group(0) @binding(7) var normal: texture_2d<f32>;
 
 // Beyond 3.5 σ a Gaussian on a plane holds e^(−3.5²/2) = .2 % of its mass.
 const REACH_SIGMAS = 3.5;
@@ -122,10 +126,18 @@ struct Metric {
 }
 
 fn metric(pixel: vec2i, here: Point) -> Metric {
-    let facing = abs(settings.spacing.xz + settings.spacing.yw * here.mm.z);
+    let mm = settings.spacing.xz + settings.spacing.yw * here.mm.z;
+    let facing = abs(mm);
     let is_screen = any(settings.spacing != vec4f(0.0));
-    let tx = tangent(pixel, vec2i(1, 0), here);
-    let ty = tangent(pixel, vec2i(0, 1), here);
+    var tx = tangent(pixel, vec2i(1, 0), here);
+    var ty = tangent(pixel, vec2i(0, 1), here);
+    let ray = settings.rays.xy + settings.rays.zw * (vec2f(pixel) + 0.5);
+    let texel = textureLoad(normal, vec2i(settings.first_pixel) + pixel, 0).xyz;
+    let slope = slope_by_normal(settings.normals, texel, ray, mm);
+    if slope.is_known {
+        tx = vec3f(ray * slope.dz.x + vec2f(mm.x, 0.0), slope.dz.x);
+        ty = vec3f(ray * slope.dz.y + vec2f(0.0, mm.y), slope.dz.y);
+    }
     let xx = dot(tx, tx);
     let yy = dot(ty, ty);
     if xx == 0.0 || yy == 0.0 {

@@ -3,6 +3,8 @@
 @group(0) @binding(4) var irradiance: texture_2d<f32>;
 @group(0) @binding(5) var depth: texture_2d<f32>;
 @group(0) @binding(6) var profile_id: texture_2d<u32>;
+@group(0) @binding(13) var<uniform> normals: Normals;
+@group(0) @binding(14) var normal: texture_2d<f32>;
 // Of each tile, a bit for each level at which it is not flat.
 @group(0) @binding(11) var<storage, read_write> bends: array<atomic<u32>>;
 
@@ -76,7 +78,13 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
         let tile = vec2u(pixel) / TILE;
         atomicOr(&bends[tile.y * columns + tile.x], (1u << FLAT_LEVELS) - (1u << flat_levels));
     }
-    let shape = Shape(id, z, vec2f(tangent(east, west, mm.x), tangent(south, north, mm.y)));
+    var shape = Shape(id, z, vec2f(tangent(east, west, mm.x), tangent(south, north, mm.y)));
+    let texel = textureLoad(normal, pixel_of_host, 0).xyz;
+    let signed_mm = view.step.xy * z + view.step.zw;
+    let slope = slope_by_normal(normals, texel, ray(pixel).xy, signed_mm);
+    if slope.is_known {
+        shape.tangent = slope.dz / mm;
+    }
     let plane = plane_of(pixel, shape);
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
     let light = textureLoad(irradiance, pixel_of_host, 0).rgb;

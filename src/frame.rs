@@ -1,6 +1,7 @@
 //! What a host hands over each frame, and what the effects hand back.
 
-use glam::{DMat4, DVec3, Mat4, Vec4};
+use bytemuck::{Pod, Zeroable};
+use glam::{DMat4, DVec3, Mat3, Mat4, Vec2, Vec4};
 use wgpu::{BlendComponent, BlendState, ColorTargetState, ColorWrites, TextureFormat, TextureView};
 
 use crate::input::{self, Role};
@@ -25,6 +26,9 @@ pub struct ScreenFrame<'a> {
     /// unsigned integer channel, such as R8Uint. `None`: all that is nearer than the far plane
     /// scatters by the first.
     pub profile_id: Option<&'a TextureView>,
+    /// Which way the surface faces. `None`, and where a texel has none: as the depth of the four
+    /// pixels around says, which is the surface itself; take that unless depth is coarse.
+    pub normal: Option<Normals<'a>>,
     /// How much a pixel takes of its scattered light, 0 to 1 in the first of one or more float
     /// channels, such as R8Unorm: less on lips, brows and where hair begins. Its own light scatters
     /// to others all the same. Where it is 0 the pixel stays bit for bit. `None`: 1.
@@ -42,6 +46,17 @@ pub struct ScreenFrame<'a> {
     pub mm_per_unit: f32,
     /// The profiles of this frame, 1 to [`MAX_PROFILES`](crate::MAX_PROFILES).
     pub profiles: &'a [Profile],
+}
+
+/// Normals of the surface, not of a normal map: the area of skin that a pixel shows follows from them.
+#[derive(Clone, Copy, Debug)]
+pub struct Normals<'a> {
+    /// X, y and z in three or four channels of a float, snorm or unorm format; of unorm ones, 0 to 1
+    /// stands for -1 to 1. Less than .1 long: none.
+    pub texture: &'a TextureView,
+    /// Rotates them to view space: the identity where they are there already, the upper 3×3 of the view
+    /// matrix where they are in world space.
+    pub to_view: Mat3,
 }
 
 /// A rectangle of pixels, counted from the left and from above.
@@ -130,6 +145,7 @@ impl ScreenFrame<'_> {
         let mut read = vec![("irradiance", self.irradiance), ("depth", self.depth)];
         let optional = [
             ("profile_id", self.profile_id, Role::Id),
+            ("normal", self.normal.map(|n| n.texture), Role::Normal),
             ("strength", self.strength, Role::Strength),
         ];
         for (name, view, role) in optional {
@@ -140,6 +156,15 @@ impl ScreenFrame<'_> {
         }
         input::check_texture("output", self.output, Role::Target(output.format()), size)?;
         input::check_apart(self.output, &read)?;
+        if let Some(normal) = self.normal
+            && !(normal.to_view.is_finite() && normal.to_view.determinant() != 0.0)
+        {
+            return Err(Error::new(
+                "normal: to_view",
+                format!("{}", normal.to_view),
+                "a finite rotation",
+            ));
+        }
         let Viewport {
             x,
             y,
@@ -170,6 +195,38 @@ impl ScreenFrame<'_> {
             width,
             height,
         })
+    }
+}
+
+/// Normals as the shaders have them.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(crate) struct NormalSettings {
+    /// Columns.
+    pub to_view: [Vec4; 3],
+    /// x·n + y has -1 to 1.
+    pub decode: Vec2,
+    pub has: u32,
+    pub pad: u32,
+}
+
+impl NormalSettings {
+    pub fn new(normals: Option<Normals>) -> Self {
+        let Some(Normals { texture, to_view }) = normals else {
+            return Self::zeroed();
+        };
+        let [x, y, z] = to_view.to_cols_array_2d();
+        let unorm = input::is_unorm(texture.texture().format());
+        Self {
+            to_view: [x, y, z].map(|[a, b, c]| Vec4::new(a, b, c, 0.0)),
+            decode: if unorm {
+                Vec2::new(2.0, -1.0)
+            } else {
+                Vec2::new(1.0, 0.0)
+            },
+            has: 1,
+            pad: 0,
+        }
     }
 }
 
@@ -255,8 +312,13 @@ impl Optics {
         Vec4::new(m.z_axis.z, m.w_axis.z, m.z_axis.w, m.w_axis.w)
     }
 
+    /// x and y over z at the corner of the viewport, and what a pixel adds.
+    pub fn rays(&self) -> Vec4 {
+        Vec4::new(self.origin.x, self.origin.y, self.step.x, self.step.y)
+    }
+
     /// The mm between pixels of a surface that faces the camera, at z mm in view space: along a row
-    /// |x + y·z|, along a column |z + w·z|.
+    /// |x + y·z|, along a column |z + w·z|; signed as the axes of the picture are.
     pub fn spacing(&self) -> Vec4 {
         let s = self.step;
         Vec4::new(s.z, s.x, s.w, s.y)

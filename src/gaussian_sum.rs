@@ -9,7 +9,7 @@ use wgpu::{
     TextureFormat, TextureView,
 };
 
-use crate::frame::Viewport;
+use crate::frame::{NormalSettings, Viewport};
 use crate::{MAX_PROFILES, Output, Profile};
 
 /// Per pixel: E·A and A, Σ over a row, and the running sum. Full floats: twelve roundings to half
@@ -22,6 +22,12 @@ const SOURCE: u32 = 3;
 const ROWS: u32 = 4;
 const SUM: u32 = 5;
 const STRENGTH: u32 = 6;
+const NORMAL: u32 = 7;
+
+const SHADER: &str = concat!(
+    include_str!("../shaders/normals.wgsl"),
+    include_str!("../shaders/gaussian_sum.wgsl")
+);
 
 /// `Settings` of the shader.
 #[repr(C)]
@@ -30,6 +36,8 @@ pub(crate) struct Settings {
     pub gaussians: [Vec4; MAX_PROFILES * Profile::MAX_GAUSSIANS],
     /// See the shader; zero where the surface itself tells.
     pub spacing: Vec4,
+    pub rays: Vec4,
+    pub normals: NormalSettings,
     pub mm_per_unit: f32,
     /// Pixels.
     pub gutter: i32,
@@ -104,6 +112,7 @@ pub(crate) struct Inputs<'a> {
     pub irradiance: &'a TextureView,
     pub output: &'a TextureView,
     pub strength: Option<&'a TextureView>,
+    pub normal: Option<&'a TextureView>,
     pub viewport: Option<Viewport>,
     pub profiles: &'a [Profile],
     pub settings: Settings,
@@ -111,8 +120,10 @@ pub(crate) struct Inputs<'a> {
 
 impl GaussianSum {
     pub fn new(device: &Device, output: Output, label: &'static str) -> Self {
-        let shader =
-            device.create_shader_module(wgpu::include_wgsl!("../shaders/gaussian_sum.wgsl"));
+        let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(SHADER.into()),
+        });
         let pass = |name: &str, textures: &[u32], target| {
             let label = format!("{label} {name}");
             Pass::new(device, &shader, &label, name, textures, target)
@@ -124,11 +135,15 @@ impl GaussianSum {
         Self {
             label,
             output,
-            source: pass("fs_source", &[POSITIONS, IRRADIANCE], SCRATCH.into()),
-            rows: pass("fs_rows", &[POSITIONS, SOURCE], SCRATCH.into()),
+            source: pass(
+                "fs_source",
+                &[POSITIONS, IRRADIANCE, NORMAL],
+                SCRATCH.into(),
+            ),
+            rows: pass("fs_rows", &[POSITIONS, SOURCE, NORMAL], SCRATCH.into()),
             sum: pass(
                 "fs_sum",
-                &[POSITIONS, IRRADIANCE, SOURCE, ROWS, SUM],
+                &[POSITIONS, IRRADIANCE, SOURCE, ROWS, SUM, NORMAL],
                 SCRATCH.into(),
             ),
             resolve: pass(
@@ -160,6 +175,7 @@ impl GaussianSum {
                 ROWS => &scratch.rows,
                 // Not looked at where there is none.
                 STRENGTH => inputs.strength.unwrap_or(inputs.irradiance),
+                NORMAL => inputs.normal.unwrap_or(inputs.irradiance),
                 _ => &scratch.sums[sum],
             })
         };
@@ -427,11 +443,22 @@ mod tests {
     #[test]
     fn settings_lie_as_the_shader_has_them() {
         assert_layout!(
-            include_str!("../shaders/gaussian_sum.wgsl"),
+            SHADER,
+            "Normals",
+            NormalSettings {
+                to_view,
+                decode,
+                has
+            }
+        );
+        assert_layout!(
+            SHADER,
             "Settings",
             Settings {
                 gaussians,
                 spacing,
+                rays,
+                normals,
                 mm_per_unit,
                 gutter,
                 profiles,

@@ -15,6 +15,8 @@ pub(crate) enum Role {
     Depth,
     /// Read as an unsigned integer.
     Id,
+    /// Read as three numbers from -1 to 1, or 0 to 1 that stand for them.
+    Normal,
     /// Read as one float, the first of any number.
     Strength,
     /// Rendered to.
@@ -45,6 +47,10 @@ pub(crate) fn check_texture(
         Role::Id => (
             matches!(kind, Some(TextureSampleType::Uint)) && format.components() == 1,
             "one unsigned integer channel".into(),
+        ),
+        Role::Normal => (
+            float && format.components() >= 3 && !format.is_srgb(),
+            "three or four float, snorm or unorm channels".into(),
         ),
         Role::Strength => (
             float && !format.has_depth_aspect(),
@@ -161,6 +167,15 @@ pub(crate) fn check_output(device: &wgpu::Device, output: Output) -> Result<(), 
         ));
     }
     Ok(())
+}
+
+/// Whether a format holds 0 to 1, in steps.
+pub(crate) fn is_unorm(format: TextureFormat) -> bool {
+    use TextureFormat as F;
+    matches!(
+        format,
+        F::Rgba8Unorm | F::Bgra8Unorm | F::Rgb10a2Unorm | F::Rgba16Unorm
+    )
 }
 
 /// Width and height in pixels.

@@ -26,7 +26,7 @@ pub mod truth;
 mod wgsl;
 
 pub use error::Error;
-pub use frame::{Output, ScreenFrame, Viewport};
+pub use frame::{Normals, Output, ScreenFrame, Viewport};
 pub use plan::{DEFAULT_MAX_ERROR, Plan, Row};
 pub use planned::PlannedScreenSpace;
 pub use profile::{Gaussian, Profile};

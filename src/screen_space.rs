@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, UVec2, Vec2};
 use wgpu::{CommandEncoder, Device, TextureFormat, TextureView};
 
-use crate::frame::Optics;
+use crate::frame::{NormalSettings, Optics};
 use crate::gaussian_sum::{self, GaussianSum, Inputs};
 use crate::{Error, Output, ScreenFrame, input};
 
@@ -135,10 +135,13 @@ impl ScreenSpace {
                 irradiance: frame.irradiance,
                 output: frame.output,
                 strength: frame.strength,
+                normal: frame.normal.map(|n| n.texture),
                 viewport: frame.viewport,
                 profiles: frame.profiles,
                 settings: gaussian_sum::Settings {
                     spacing: optics.spacing(),
+                    rays: optics.rays(),
+                    normals: NormalSettings::new(frame.normal),
                     first_pixel: viewport.first(),
                     has_strength: u32::from(frame.strength.is_some()),
                     ..gaussian_sum::Settings::new(frame.profiles, 1.0)

@@ -96,6 +96,7 @@ impl TextureSpace {
                 irradiance: atlas.irradiance,
                 output: atlas.output,
                 strength: None,
+                normal: None,
                 viewport: None,
                 profiles: atlas.profiles,
                 settings: Settings {

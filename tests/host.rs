@@ -6,10 +6,12 @@ mod common;
 use std::sync::OnceLock;
 
 use common::{View, gpu, plane, sphere};
-use glam::{DMat4, DVec3, DVec4, Mat4};
+use glam::{DMat4, DVec3, DVec4, Mat3, Mat4};
 use subsurface::truth::closed_form::step;
-use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Output, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace, Viewport};
+use subsurface::wgpu::{CommandEncoder, TextureFormat, TextureView};
+use subsurface::{
+    Normals, Output, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace, Viewport,
+};
 
 const SIZE: [u32; 2] = [96, 80];
 const HALF: TextureFormat = TextureFormat::Rgba16Float;
@@ -18,6 +20,21 @@ const HALF: TextureFormat = TextureFormat::Rgba16Float;
 fn plan() -> &'static Plan {
     static PLAN: OnceLock<Plan> = OnceLock::new();
     PLAN.get_or_init(|| Plan::new(&[Profile::SKIN], 0.01).unwrap())
+}
+
+/// Scatters a frame by the one effect or the other.
+fn record(planned: bool, output: Output, frame: &ScreenFrame, encoder: &mut CommandEncoder) {
+    let gpu = gpu();
+    if planned {
+        let mut effect = PlannedScreenSpace::new(&gpu.device, output).unwrap();
+        let prepared = effect.prepare(&gpu.device, &gpu.queue, frame, plan());
+        prepared.unwrap();
+        effect.render(encoder);
+    } else {
+        let mut effect = ScreenSpace::new(&gpu.device, output).unwrap();
+        effect.prepare(&gpu.device, frame).unwrap();
+        effect.render(encoder);
+    }
 }
 
 /// A sphere before nothing, in half floats.
@@ -119,6 +136,7 @@ impl Scene {
             irradiance: &gpu.upload("irradiance", self.size, HALF, &halves(&self.irradiance)),
             depth: &gpu.upload("depth", self.size, TextureFormat::R32Float, &self.depth),
             profile_id: (!asked.no_ids).then_some(&id),
+            normal: None,
             strength: asked.strength,
             viewport: asked.viewport,
             output: &to,
@@ -126,17 +144,7 @@ impl Scene {
             mm_per_unit: 1.0,
             profiles: &[Profile::SKIN],
         };
-        if planned {
-            let mut effect = PlannedScreenSpace::new(&gpu.device, output).unwrap();
-            effect
-                .prepare(&gpu.device, &gpu.queue, &frame, plan())
-                .unwrap();
-            gpu.run(|encoder| effect.render(encoder));
-        } else {
-            let mut effect = ScreenSpace::new(&gpu.device, output).unwrap();
-            effect.prepare(&gpu.device, &frame).unwrap();
-            gpu.run(|encoder| effect.render(encoder));
-        }
+        gpu.run(|encoder| record(planned, output, &frame, encoder));
         gpu.read(&to)
     }
 
@@ -254,6 +262,63 @@ fn light_that_is_no_number_goes_no_further() {
         let worst = largest_difference(&a_away, &b_away);
         println!("planned: {planned}, off by {worst:.4}");
         assert!(worst <= 0.02, "planned: {planned}, {worst}");
+    }
+}
+
+#[test]
+fn normals_say_what_depth_says() {
+    let view = View::orthographic([112, 112], 4.0);
+    let light = DVec3::new(1.0, 0.0, 1.0).normalize();
+    let seen = view.shoot(sphere(10.0, 100.0, |n| DVec3::splat(n.dot(light).max(0.0))));
+    let asked: Vec<usize> = seen
+        .pixels(|h| h.normal.z > 0.35)
+        .iter()
+        .map(|(i, _)| *i)
+        .collect();
+    // A camera that looks elsewhere than along the world's axes.
+    let to_view = Mat3::from_rotation_y(0.7) * Mat3::from_rotation_x(-0.4);
+    let normals = |encode: &dyn Fn(glam::Vec3) -> glam::Vec3| -> Vec<[f32; 4]> {
+        let normal = |h: &Option<common::Hit>| h.map_or(glam::Vec3::ZERO, |h| h.normal.as_vec3());
+        let encoded = seen
+            .hits
+            .iter()
+            .map(|h| encode(normal(h)).extend(0.0).to_array());
+        encoded.collect()
+    };
+    let in_view = normals(&|n| n);
+    let in_world = normals(&|n| to_view.transpose() * n);
+    let none = normals(&|_| glam::Vec3::ZERO);
+    let full = TextureFormat::Rgba32Float;
+    for planned in [false, true] {
+        let scatter = |normals: Option<(&[[f32; 4]], Mat3)>| {
+            let texture =
+                normals.map(|(texels, _)| gpu().upload("normal", view.size, full, texels));
+            seen.render(&[Profile::SKIN], full, |frame, encoder| {
+                let normal = normals
+                    .zip(texture.as_ref())
+                    .map(|((_, to_view), texture)| Normals { texture, to_view });
+                let frame = ScreenFrame { normal, ..*frame };
+                record(planned, full.into(), &frame, encoder);
+            })
+        };
+        let by_depth = scatter(None);
+        let by_normals = scatter(Some((&in_view, Mat3::IDENTITY)));
+        assert_eq!(scatter(Some((&none, Mat3::IDENTITY))), by_depth);
+        let world = scatter(Some((&in_world, to_view)));
+        // A rotation there and back, in single floats; half floats between the passes of a plan.
+        assert!(largest_difference(&world, &by_normals) <= 0.001);
+        let red_rms = |out: &[[f32; 4]]| {
+            let out: Vec<DVec3> = out.iter().map(|p| DVec3::splat(p[0].into())).collect();
+            common::rms(seen.errors(&out, &asked).iter().map(|e| e.x))
+        };
+        let [depth, normal] = [&by_depth, &by_normals].map(|out| red_rms(out));
+        println!(
+            "planned: {planned}, red RMS to the visible integral by depth {depth:.5}, by normals {normal:.5}"
+        );
+        assert!(
+            normal <= 1.1 * depth,
+            "{normal} by normals, {depth} by depth"
+        );
     }
 }
 
@@ -415,6 +480,7 @@ impl Camera {
             irradiance: &gpu.upload("irradiance", target, full, &irradiance),
             depth: &gpu.upload("depth", target, TextureFormat::R32Float, &depth),
             profile_id: None,
+            normal: None,
             strength: None,
             viewport: self.viewport,
             output: &output,
@@ -422,17 +488,7 @@ impl Camera {
             mm_per_unit: self.mm_per_unit as f32,
             profiles: &[Profile::SKIN],
         };
-        if planned {
-            let mut effect = PlannedScreenSpace::new(&gpu.device, full).unwrap();
-            effect
-                .prepare(&gpu.device, &gpu.queue, &frame, plan())
-                .unwrap();
-            gpu.run(|encoder| effect.render(encoder));
-        } else {
-            let mut effect = ScreenSpace::new(&gpu.device, full).unwrap();
-            effect.prepare(&gpu.device, &frame).unwrap();
-            gpu.run(|encoder| effect.render(encoder));
-        }
+        gpu.run(|encoder| record(planned, full.into(), &frame, encoder));
         let out = gpu.read(&output);
         let moment = |f: &dyn Fn(f64) -> f64| -> f64 {
             let parts = places.iter().map(|(i, x)| f64::from(out[*i][0]) * f(*x));

@@ -5,10 +5,10 @@ mod common;
 use std::sync::OnceLock;
 
 use common::gpu;
-use glam::Mat4;
+use glam::{Mat3, Mat4};
 use subsurface::wgpu::{self, TextureFormat, TextureUsages, TextureView};
 use subsurface::{
-    Atlas, Error, Output, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace,
+    Atlas, Error, Normals, Output, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace,
     TextureSpace, Viewport,
 };
 
@@ -44,6 +44,7 @@ fn screen(change: impl FnOnce(&mut Inputs)) -> Result<(), Error> {
         irradiance: view(TextureFormat::Rgba16Float),
         depth: view(TextureFormat::Depth32Float),
         profile_id: Some(view(TextureFormat::R8Uint)),
+        normal: None,
         strength: None,
         output: view(TextureFormat::Rgba16Float),
         viewport: None,
@@ -56,6 +57,10 @@ fn screen(change: impl FnOnce(&mut Inputs)) -> Result<(), Error> {
         irradiance: &inputs.irradiance,
         depth: &inputs.depth,
         profile_id: inputs.profile_id.as_ref(),
+        normal: inputs.normal.as_ref().map(|(texture, to_view)| Normals {
+            texture,
+            to_view: *to_view,
+        }),
         strength: inputs.strength.as_ref(),
         viewport: inputs.viewport,
         output: &inputs.output,
@@ -95,6 +100,7 @@ struct Inputs {
     irradiance: TextureView,
     depth: TextureView,
     profile_id: Option<TextureView>,
+    normal: Option<(TextureView, Mat3)>,
     strength: Option<TextureView>,
     output: TextureView,
     viewport: Option<Viewport>,
@@ -132,6 +138,13 @@ fn what_fits_is_taken() {
     screen(|i| i.irradiance = packed).unwrap();
     screen(|i| i.profile_id = Some(view(TextureFormat::R32Uint))).unwrap();
     screen(|i| i.profile_id = None).unwrap();
+    for normal in [
+        TextureFormat::Rgba16Float,
+        TextureFormat::Rgb10a2Unorm,
+        TextureFormat::Rgba8Unorm,
+    ] {
+        screen(|i| i.normal = Some((view(normal), Mat3::IDENTITY))).unwrap();
+    }
     for strength in [TextureFormat::R8Unorm, TextureFormat::Rgba16Float] {
         screen(|i| i.strength = Some(view(strength))).unwrap();
     }
@@ -170,6 +183,21 @@ fn what_does_not_fit_is_named() {
     refused("profile_id: format", |i| {
         i.profile_id = Some(view(TextureFormat::R8Unorm))
     });
+    refused("normal: format", |i| {
+        i.normal = Some((view(TextureFormat::Rg16Float), Mat3::IDENTITY))
+    });
+    refused("normal: format", |i| {
+        i.normal = Some((view(TextureFormat::Rgba8UnormSrgb), Mat3::IDENTITY))
+    });
+    refused("normal: size", |i| {
+        let small = gpu().target("small", [8, 8], TextureFormat::Rgba16Float);
+        i.normal = Some((small, Mat3::IDENTITY));
+    });
+    for to_view in [Mat3::ZERO, Mat3::NAN] {
+        let normal = Some((view(TextureFormat::Rgba16Float), to_view));
+        let error = screen(|i| i.normal = normal).unwrap_err();
+        assert_eq!(error.input, "normal: to_view");
+    }
     refused("strength: format", |i| {
         i.strength = Some(view(TextureFormat::R8Uint))
     });
@@ -279,6 +307,7 @@ fn what_a_plan_cannot_do_is_named() {
         irradiance: &views[0],
         depth: &views[1],
         profile_id: None,
+        normal: None,
         strength: None,
         viewport: None,
         output: &views[2],
@@ -317,6 +346,7 @@ fn a_frame_that_was_refused_leaves_the_one_before() {
         irradiance: &irradiance,
         depth: &depth,
         profile_id: None,
+        normal: None,
         strength: None,
         viewport: None,
         output: &output,
@@ -403,6 +433,7 @@ fn sizes_may_change_from_frame_to_frame() {
                     irradiance: &target(TextureFormat::Rgba16Float),
                     depth: &target(TextureFormat::Depth32Float),
                     profile_id: Some(&target(TextureFormat::R8Uint)),
+                    normal: None,
                     strength: None,
                     viewport: None,
                     output: &target(TextureFormat::Rgba16Float),

@@ -335,6 +335,7 @@ fn frames_of_every_size_are_scattered() {
             irradiance: &gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &light),
             depth: &gpu.upload("depth", size, TextureFormat::R32Float, &vec![0.5f32; count]),
             profile_id: Some(&gpu.upload("id", size, TextureFormat::R8Uint, &vec![1u8; count])),
+            normal: None,
             strength: None,
             viewport: None,
             output: &output,

@@ -32,6 +32,7 @@ fn screen_space(head: &Head) -> TextureView {
         irradiance: &head.renderer.gbuffer.irradiance,
         depth: &head.renderer.gbuffer.depth,
         profile_id: Some(&head.renderer.gbuffer.profile_id),
+        normal: None,
         strength: None,
         viewport: None,
         output: &output,

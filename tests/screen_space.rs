@@ -442,6 +442,7 @@ fn two_frames_may_share_a_submission() {
             irradiance: &irradiance,
             depth: &depth,
             profile_id: Some(&profile_id),
+            normal: None,
             strength: None,
             viewport: None,
             output,

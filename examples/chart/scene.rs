@@ -164,6 +164,7 @@ impl Scene {
             irradiance: &self.irradiance,
             depth: &self.depth,
             profile_id: Some(&self.profile_id),
+            normal: None,
             strength: None,
             viewport: None,
             output,

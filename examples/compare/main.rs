@@ -317,6 +317,7 @@ fn scatter_screen(
                 irradiance,
                 depth,
                 profile_id: Some(profile_id),
+                normal: None,
                 strength: None,
                 viewport: None,
                 output: &output,

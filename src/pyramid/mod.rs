@@ -9,7 +9,7 @@ use wgpu::{
     TextureView,
 };
 
-use crate::frame::{Optics, Viewport};
+use crate::frame::{NormalSettings, Optics, Viewport};
 use crate::gaussian_sum::{begin, scratch_view};
 use crate::plan::Weights;
 use crate::{Output, ScreenFrame};
@@ -63,6 +63,7 @@ struct Views {
     depth: TextureView,
     profile_id: TextureView,
     strength: TextureView,
+    normal: TextureView,
     output: TextureView,
 }
 
@@ -123,12 +124,15 @@ impl Pyramid {
             pad: 0,
         };
         queue.write_buffer(&scratch.view, 0, bytemuck::bytes_of(&view));
+        let normals = NormalSettings::new(frame.normal);
+        queue.write_buffer(&scratch.normals, 0, bytemuck::bytes_of(&normals));
         let views = Views {
             irradiance: frame.irradiance.clone(),
             depth: frame.depth.clone(),
             profile_id: frame.profile_id.unwrap_or(&self.no_id).clone(),
             // Not looked at where there is none.
             strength: frame.strength.unwrap_or(frame.irradiance).clone(),
+            normal: frame.normal.map_or(frame.irradiance, |n| n.texture).clone(),
             output: frame.output.clone(),
         };
         match &mut self.frame {
@@ -268,6 +272,7 @@ impl Frame {
             depth,
             profile_id,
             strength,
+            normal,
             ..
         } = &views;
         use wgpu::BindingResource::{Sampler, TextureView as Texture};
@@ -362,6 +367,8 @@ impl Frame {
                     (5, Texture(depth)),
                     (6, Texture(profile_id)),
                     (11, scratch.bends.as_entire_binding()),
+                    (13, scratch.normals.as_entire_binding()),
+                    (14, Texture(normal)),
                 ],
             ),
             halve: (1..levels.len()).map(halve).collect(),
@@ -426,6 +433,7 @@ mod tests {
                 irradiance: &light,
                 depth: &depth,
                 profile_id: Some(&gpu.upload("id", size, TextureFormat::R8Uint, &vec![id; count])),
+                normal: None,
                 strength: None,
                 viewport: None,
                 output: &output,

@@ -22,7 +22,10 @@ macro_rules! over_surface {
         )
     };
 }
-pub(super) const PACK: &str = over_surface!("pack.wgsl");
+pub(super) const PACK: &str = concat!(
+    include_str!("../../shaders/normals.wgsl"),
+    over_surface!("pack.wgsl")
+);
 const HALVE: &str = over_surface!("halve.wgsl");
 /// The blurs where all is simple, and elsewhere.
 pub(super) const BLURS: [&str; 2] = [
@@ -116,7 +119,7 @@ impl Passes {
                     device,
                     &shaders.pack,
                     ["vs_tile", "fs_pack"],
-                    &[0, 1, 2, 4, 5, 6, 11],
+                    &[0, 1, 2, 4, 5, 6, 11, 13, 14],
                     &surface,
                     &[("CAREFUL", careful)],
                 )
@@ -212,7 +215,8 @@ fn entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
         ),
         2 => buffer_entry(binding, ShaderStages::VERTEX, READ),
         3 => buffer_entry(binding, at | ShaderStages::VERTEX, READ),
-        4 | 5 => texture_entry(binding, at, FLOAT),
+        4 | 5 | 14 => texture_entry(binding, at, FLOAT),
+        13 => buffer_entry(binding, at, BufferBindingType::Uniform),
         7 | 9 => texture_entry(binding, at, FILTERED),
         11 => buffer_entry(binding, at, WRITE),
         12 => wgpu::BindGroupLayoutEntry {

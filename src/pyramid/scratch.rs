@@ -5,6 +5,7 @@ use glam::{UVec2, Vec2, Vec4};
 use wgpu::{Buffer, BufferUsages, Device, Queue, TextureView};
 
 use super::passes::{LIGHT, SHAPE};
+use crate::frame::NormalSettings;
 use crate::gaussian_sum::scratch_view;
 use crate::plan::{Shape, Weights, own_blur};
 
@@ -71,6 +72,7 @@ pub(super) const DRAW_BYTES: u64 = 16;
 pub(super) struct Scratch {
     pub size: [u32; 2],
     pub view: Buffer,
+    pub normals: Buffer,
     /// Of the frame's tiles, what they hold and where they bend.
     pub marked: Buffer,
     pub bends: Buffer,
@@ -159,6 +161,7 @@ impl Scratch {
         Self {
             size,
             view: uniform("subsurface view", size_of::<View>()),
+            normals: uniform("subsurface normals", size_of::<NormalSettings>()),
             marked: words("subsurface marks", frame_tiles, BufferUsages::empty()),
             bends: words("subsurface bends", frame_tiles, BufferUsages::COPY_DST),
             levels,

@@ -194,6 +194,7 @@ impl GBuffer {
             irradiance: &gpu.upload("irradiance", size, full, &irradiance),
             depth: &gpu.upload("depth", size, TextureFormat::R32Float, &depth),
             profile_id: Some(&gpu.upload("profile id", size, TextureFormat::R8Uint, &id)),
+            normal: None,
             strength: None,
             viewport: None,
             output: &output,

@@ -95,6 +95,7 @@ impl View {
             irradiance: &gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &irradiance),
             depth: &gpu.upload("depth", size, TextureFormat::R32Float, &depth),
             profile_id: Some(&gpu.upload("profile id", size, TextureFormat::R8Uint, &id)),
+            normal: None,
             strength: None,
             viewport: None,
             output: &output,
