@@ -105,6 +105,8 @@ impl Camera {
 pub struct Dump {
     pub camera: Camera,
     pub irradiance: Vec<[f32; 4]>,
+    /// In view space.
+    pub normal: Option<Vec<[f32; 4]>>,
     /// As the projection writes it; 0 where nothing is.
     pub depth: Vec<f32>,
     pub profile_id: Vec<u8>,
@@ -125,15 +127,18 @@ impl Dump {
         check(&path, size, values.as_flattened(), "finite light", |_| true)?;
         let irradiance = values.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
 
-        // Asked for by the format, and checked, so that a bad one is found; but nothing uses it: the
-        // effects make normals from depth.
-        if let Some(normal) = &camera.files.normal {
-            let path = camera.file(normal);
-            let Pixels { values, .. } = channels::read_three(&path, size, &channels::RGB_OR_XYZ)?;
-            check(&path, size, values.as_flattened(), "finite vectors", |_| {
-                true
-            })?;
-        }
+        let normal = match &camera.files.normal {
+            None => None,
+            Some(path) => {
+                let path = camera.file(path);
+                let Pixels { values, .. } =
+                    channels::read_three(&path, size, &channels::RGB_OR_XYZ)?;
+                check(&path, size, values.as_flattened(), "finite vectors", |_| {
+                    true
+                })?;
+                Some(values.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect())
+            }
+        };
 
         let path = camera.file(&camera.files.depth);
         let distance = channels::read_one(&path, size)?;
@@ -180,6 +185,7 @@ impl Dump {
         Ok(Self {
             camera,
             irradiance,
+            normal,
             depth,
             profile_id,
             depth_is_half,

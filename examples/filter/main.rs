@@ -25,7 +25,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use subsurface::renderer::Gpu;
 use subsurface::wgpu::{self, TextureFormat};
-use subsurface::{Error, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace};
+use subsurface::{Error, Normals, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace};
 
 use dump::{Camera, Dump};
 use options::Options;
@@ -120,10 +120,18 @@ fn scatter(
     let invalid = device.push_error_scope(wgpu::ErrorFilter::Validation);
     let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
     let output = gpu.target("scattered", size, format);
+    let normals = dump.normal.as_ref();
+    let normals = normals.map(|texels| gpu.upload("normal", size, format, texels));
     let frame = ScreenFrame {
         irradiance: &gpu.upload("irradiance", size, format, &dump.irradiance),
         depth: &gpu.upload("depth", size, TextureFormat::R32Float, &dump.depth),
-        profile_id: &gpu.upload("profile id", size, TextureFormat::R8Uint, &dump.profile_id),
+        profile_id: Some(&gpu.upload("profile id", size, TextureFormat::R8Uint, &dump.profile_id)),
+        normal: normals.as_ref().map(|texture| Normals {
+            texture,
+            to_view: glam::Mat3::IDENTITY,
+        }),
+        strength: None,
+        viewport: None,
         output: &output,
         projection: dump.camera.projection,
         mm_per_unit: dump.camera.mm_per_unit,
