@@ -6,7 +6,7 @@
 use glam::Mat4;
 use subsurface::renderer::Gpu;
 use subsurface::wgpu::{self, TextureFormat};
-use subsurface::{Error, Profile, ScreenFrame, ScreenSpace};
+use subsurface::{DEFAULT_MAX_ERROR, Error, Plan, PlannedScreenSpace, Profile, ScreenFrame};
 
 /// What the deferred renderer has by the time its diffuse light is done.
 struct Frame {
@@ -19,19 +19,23 @@ struct Frame {
 
 // The integration: README.md shows these lines.
 struct Skin {
-    effect: ScreenSpace,
+    plan: Plan,
+    effect: PlannedScreenSpace,
 }
 
 impl Skin {
     fn new(device: &wgpu::Device) -> Result<Self, Error> {
-        let effect = ScreenSpace::new(device, TextureFormat::Rgba16Float)?;
-        Ok(Self { effect })
+        Ok(Self {
+            plan: Plan::new(&[Profile::SKIN], DEFAULT_MAX_ERROR)?, // some seconds
+            effect: PlannedScreenSpace::new(device, TextureFormat::Rgba16Float)?,
+        })
     }
 
     /// After lighting, before specular and tone mapping.
     fn scatter(
         &mut self,
         device: &wgpu::Device,
+        queue: &wgpu::Queue,
         encoder: &mut wgpu::CommandEncoder,
         frame: &Frame,
     ) -> Result<(), Error> {
@@ -47,7 +51,7 @@ impl Skin {
             mm_per_unit: 1000.0, // a scene in metres
             profiles: &[Profile::SKIN],
         };
-        self.effect.prepare(device, &inputs)?;
+        self.effect.prepare(device, queue, &inputs, &self.plan)?;
         self.effect.render(encoder);
         Ok(())
     }
@@ -58,7 +62,7 @@ fn main() -> Result<(), Error> {
     let frame = made_up_frame(&gpu);
     let mut skin = Skin::new(&gpu.device)?;
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    skin.scatter(&gpu.device, &mut encoder, &frame)?;
+    skin.scatter(&gpu.device, &gpu.queue, &mut encoder, &frame)?;
     gpu.queue.submit([encoder.finish()]);
 
     let width = frame.scattered.texture().width() as usize;

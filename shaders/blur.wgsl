@@ -69,7 +69,8 @@ fn scale_of(m: vec3f, id: u32) -> Scale {
         let a = vec2f(-m.y, m.x - lambda.y);
         let b = vec2f(m.z - lambda.y, -m.y);
         let along = normalize(select(a, b, dot(b, b) > dot(a, a)));
-        let u = vec2i(round(min(1.3 * further, LONGEST_STEP) * along));
+        let wanted = select(1.3 * further, max(0.65 * further, 1.0), FINEST);
+        let u = vec2i(round(min(wanted, LONGEST_STEP) * along));
         lattice = Lattice(u, select(vec2i(1, 0), vec2i(0, 1), abs(u.x) >= abs(u.y)));
     }
     let octave = -0.5 * log2(mm2) + log2(level.scale);

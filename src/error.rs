@@ -5,7 +5,7 @@ use std::fmt;
 /// An input that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Error {
-    /// The input, by the name of its field or its file.
+    /// The input: it begins with the name of its field or its file.
     pub input: String,
     /// What was handed in.
     pub got: String,

@@ -10,9 +10,10 @@ use crate::{Error, Profile};
 /// One frame of a deferred renderer, as [`ScreenSpace::prepare`](crate::ScreenSpace::prepare) and
 /// [`PlannedScreenSpace::prepare`](crate::PlannedScreenSpace::prepare) take it.
 ///
-/// All textures are two-dimensional, single-sampled, and of one size; their views are of two
+/// All textures are two-dimensional, single-sampled, and of one size, that of the irradiance; what is
+/// read has the usage `TEXTURE_BINDING`, the output `RENDER_ATTACHMENT`. Their views are of two
 /// dimensions, of mip level 0 and in the texture's own format, which wgpu leaves to the host to see
-/// to.
+/// to. It is `Copy`: `ScreenFrame { output: &other, ..frame }` is another of the same.
 #[derive(Clone, Copy, Debug)]
 pub struct ScreenFrame<'a> {
     /// Lit diffuse irradiance E, linear and finite RGB, *before* specular and tone mapping; three or
@@ -40,7 +41,9 @@ pub struct ScreenFrame<'a> {
     /// or written. `None`: all.
     pub viewport: Option<Viewport>,
     /// View space to clip space, as wgpu has it: depth from 0 to 1, y up. Perspective or
-    /// orthographic, forward, reversed or infinite; off-centre and jittered ones, too.
+    /// orthographic, forward, reversed or infinite; off-centre and jittered ones, too. With glam one of
+    /// `camera::rh::proj::directx`; those of `vulkan`, y down, and `opengl`, depth from -1, cannot be
+    /// told from others and go wrong.
     pub projection: Mat4,
     /// Length of a scene unit in mm: 1000 where the scene is in metres.
     pub mm_per_unit: f32,
@@ -80,12 +83,14 @@ pub enum Output {
     /// The scattered light, and the light as it was where nothing scatters: for a texture of its own,
     /// which a final pass multiplies by albedo. Three or four float channels.
     Scattered(TextureFormat),
-    /// The same, added to what is there: for a target that lacks the diffuse light. As for the
-    /// difference, a format that this device can blend, and E with its albedo.
+    /// The same, added to what is there: for a target that lacks the diffuse light. The irradiance must be
+    /// that light, times its albedo, which then is scattered, too. A format that this device blends.
     AddScattered(TextureFormat),
     /// What scattering changes, added to what is there: for a target that has the diffuse light
-    /// already, so that a frame without the effect is right, too. Red, green and blue; what does not
-    /// scatter is not touched.
+    /// already, so that a frame without the effect is right, too. The irradiance must be what is in the
+    /// target, times its albedo, in a texture of its own. Red, green and blue; what does not scatter is
+    /// not touched. Rgba16Float, or Rgba32Float on devices that blend it, since a difference may be
+    /// negative.
     AddDifference(TextureFormat),
 }
 

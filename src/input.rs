@@ -153,7 +153,7 @@ pub(crate) fn check_output(device: &wgpu::Device, output: Output) -> Result<(), 
             .contains(TextureUsages::RENDER_ATTACHMENT)
     {
         return Err(Error::new(
-            "output_format",
+            "output: format",
             format!("{format:?}"),
             "a format of three or four float channels that this device renders to",
         ));
@@ -161,9 +161,20 @@ pub(crate) fn check_output(device: &wgpu::Device, output: Output) -> Result<(), 
     let blends = wgpu::TextureFormatFeatureFlags::BLENDABLE;
     if output.adds() && !features.flags.contains(blends) {
         return Err(Error::new(
-            "output_format",
+            "output: format",
             format!("{format:?}"),
             "a format that this device blends, such as Rgba16Float",
+        ));
+    }
+    let signed = matches!(
+        format,
+        TextureFormat::Rgba16Float | TextureFormat::Rgba32Float
+    );
+    if output.is_difference() && !signed {
+        return Err(Error::new(
+            "output: format",
+            format!("{format:?}"),
+            "Rgba16Float or Rgba32Float, since a difference may be negative",
         ));
     }
     Ok(())

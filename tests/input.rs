@@ -272,7 +272,7 @@ fn an_output_format_that_cannot_be_drawn_to_is_named() {
         TextureFormat::Bc1RgbaUnorm,
     ] {
         let error = ScreenSpace::new(device, format).err().expect("refused");
-        assert_eq!(error.input, "output_format");
+        assert_eq!(error.input, "output: format");
         assert!(TextureSpace::new(device, format).is_err());
     }
 }
@@ -288,9 +288,17 @@ fn an_output_format_that_cannot_be_blended_is_named() {
             PlannedScreenSpace::new(device, full).err(),
         ];
         for error in errors {
-            assert_eq!(error.expect("refused").input, "output_format");
+            assert_eq!(error.expect("refused").input, "output: format");
         }
     }
+}
+
+#[test]
+fn a_difference_needs_a_sign() {
+    let unorm = TextureFormat::Rgba8Unorm;
+    let error = ScreenSpace::new(&gpu().device, Output::AddDifference(unorm));
+    assert_eq!(error.err().expect("refused").input, "output: format");
+    assert!(ScreenSpace::new(&gpu().device, Output::AddScattered(unorm)).is_ok());
 }
 
 /// A plan of other profiles than the frame's, and projections that only the exact effect takes.

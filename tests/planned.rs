@@ -216,6 +216,31 @@ fn slopes_keep_it_while_they_are_not_steep() {
 }
 
 #[test]
+fn hard_edges_down_a_slope_are_off_by_no_more_than_the_docs_say() {
+    // Taps of a slope lie two pixels apart along its contour: an edge that is as sharp as a pixel and
+    // runs down the slope falls between them.
+    for (tilt, most) in [(30.0, 2.0 / 255.0), (60.0, 0.2)] {
+        for px_per_mm in [2.0, 4.0, 8.0] {
+            let view = View::orthographic([256, 256], px_per_mm);
+            let g = view.shoot(plane(tilted_normal(tilt, 0.0), 500.0, |p| {
+                DVec3::splat(step(p.x, 0.0))
+            }));
+            let out = g.scatter_planned(&[Profile::SKIN], &plans()[1]);
+            let out: Vec<DVec3> = out.into_iter().map(rgb).collect();
+            let middle =
+                |h: &Hit| h.point.y.abs() < 1.0 / px_per_mm && h.point.x.abs() < 8.0 / px_per_mm;
+            let pixels: Vec<usize> = g.pixels(middle).iter().map(|(i, _)| *i).collect();
+            assert!(pixels.len() > 16);
+            let errors = g.errors(&out, &pixels);
+            let error = errors.iter().map(|e| e.abs().max_element());
+            let error = error.fold(0.0, f64::max);
+            println!("hard, down a slope of {tilt}°, {px_per_mm} px/mm: {error:.5}");
+            assert!(error <= most, "{tilt}°, {px_per_mm} px/mm: {error}");
+        }
+    }
+}
+
+#[test]
 fn a_sphere_is_as_near_to_eq_7_as_the_docs_say() {
     let rho_mm = 10.0;
     let light = DVec3::new(1.0, 0.0, 1.0).normalize();

@@ -16,7 +16,7 @@ pub(crate) use kernels::{Kinds, Shape, own_blur};
 pub(crate) use weights::ROWS_PER_OCTAVE;
 pub(crate) use weights::Weights;
 
-/// The error that a result of eight bits a channel can show, in units of white.
+/// 1/255, the error that a result of eight bits a channel can show, in units of white.
 pub const DEFAULT_MAX_ERROR: f32 = 1.0 / 255.0;
 
 /// The largest error of the exact effect on edges that are soft by a pixel (`tests/screen_space.rs`).
@@ -25,9 +25,8 @@ const EXACT_ERROR: f32 = 0.0005;
 /// How profiles are scattered at a stated error: which blurs, how much of each at every scale, or the
 /// exact effect where nothing less will do.
 ///
-/// It is made once for a set of profiles, not for each frame: fitting a profile takes a second, or
-/// several where `max_error` is small. Every blur is a
-/// Gaussian of a fixed width *in pixels*, those of a level twice as wide as those of the level
+/// It is made once for a set of profiles, not for each frame: fitting a profile takes seconds. Every
+/// blur is a Gaussian of a fixed width *in pixels*, those of a level twice as wide as those of the level
 /// before; what changes with the scale is how much of each is taken. The weights are fitted so that
 /// the largest error on straight edges is the least, along the axes of the pixels, at 45° and at 27°:
 /// edges soft by σ = 1 px against the closed form, hard ones against the visible integral. It holds up

@@ -52,6 +52,7 @@ fn main() -> Result<(), Failure> {
         irradiance: &g.irradiance,
         depth: &g.depth,
         profile_id: Some(&g.id),
+        normal: None,
         strength: None,
         output: &planned_layer,
         viewport: None,
