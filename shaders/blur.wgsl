@@ -69,6 +69,7 @@ fn scale_of(m: vec3f, id: u32) -> Scale {
         let a = vec2f(-m.y, m.x - lambda.y);
         let b = vec2f(m.z - lambda.y, -m.y);
         let along = normalize(select(a, b, dot(b, b) > dot(a, a)));
+        // Closer on the frame, where there is detail of a pixel.
         let wanted = select(1.3 * further, max(0.65 * further, 1.0), FINEST);
         let u = vec2i(round(min(wanted, LONGEST_STEP) * along));
         lattice = Lattice(u, select(vec2i(1, 0), vec2i(0, 1), abs(u.x) >= abs(u.y)));

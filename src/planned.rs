@@ -11,7 +11,7 @@ use crate::{Error, Output, Plan, ScreenFrame, ScreenSpace};
 /// It takes what [`ScreenSpace`](crate::ScreenSpace) takes. The plan's error holds for flat surfaces; on
 /// heads it is measured (docs/results.md), and where layers lie within millimetres of each other, at
 /// silhouettes and on steep slopes under detail of a pixel it is larger (a shadow edge as sharp as a
-/// pixel that runs down a slope of 60° is off by up to .05): there, use the exact effect.
+/// pixel that runs down a slope of 60° is off by up to .022): there, use the exact effect.
 ///
 /// Blurs run over the tiles that hold skin and their neighbours alone, which the GPU finds; marking,
 /// clearing and the copy of what does not scatter go over the frame. Between passes light is half
