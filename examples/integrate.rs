@@ -1,12 +1,15 @@
-//! The smallest host: hands the effect a frame and reads the scattered layer back.
+//! The smallest host: hands a frame to the effect in screen space and an atlas to the one in texture
+//! space, and reads both results back. Choosing the mode is choosing which of them a final pass samples.
 //!
-//! The frame is made up on the CPU, a plane lit on its right half; a renderer hands over the
-//! textures it has. What a host writes is `struct Skin` and its two functions.
+//! Both are made up on the CPU, a plane lit on its right half; a renderer hands over the textures it
+//! has. What a host writes is `struct Skin` or `struct SkinAtlas`, and their functions.
 
 use glam::Mat4;
 use subsurface::renderer::Gpu;
 use subsurface::wgpu::{self, TextureFormat};
-use subsurface::{DEFAULT_MAX_ERROR, Error, Plan, PlannedScreenSpace, Profile, ScreenFrame};
+use subsurface::{
+    Atlas, DEFAULT_MAX_ERROR, Error, Plan, PlannedScreenSpace, Profile, ScreenFrame, TextureSpace,
+};
 
 /// What the deferred renderer has by the time its diffuse light is done.
 struct Frame {
@@ -57,47 +60,102 @@ impl Skin {
     }
 }
 
+/// What it has by the time it has drawn the head into its atlas, by `TextureSpace::VERTEX_WGSL`.
+struct Unrolled {
+    irradiance: wgpu::TextureView,
+    positions: wgpu::TextureView,
+    scattered: wgpu::TextureView,
+}
+
+// The integration in texture space.
+struct SkinAtlas {
+    effect: TextureSpace,
+}
+
+impl SkinAtlas {
+    fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        let effect = TextureSpace::new(device, TextureFormat::Rgba16Float)?;
+        Ok(Self { effect })
+    }
+
+    /// After the atlas is lit, before the head is drawn with what comes out.
+    fn scatter(
+        &mut self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        unrolled: &Unrolled,
+    ) -> Result<(), Error> {
+        let inputs = Atlas {
+            irradiance: &unrolled.irradiance,
+            positions: &unrolled.positions, // in metres, and 1 where there is skin
+            output: &unrolled.scattered,    // sample this one by the mesh's UVs
+            mm_per_unit: 1000.0,
+            profiles: &[Profile::SKIN],
+        };
+        self.effect.prepare(device, &inputs)?;
+        self.effect.render(encoder);
+        Ok(())
+    }
+}
+
 fn main() -> Result<(), Error> {
     let gpu = Gpu::headless()?;
     let frame = made_up_frame(&gpu);
+    let unrolled = made_up_atlas(&gpu);
     let mut skin = Skin::new(&gpu.device)?;
+    let mut atlas = SkinAtlas::new(&gpu.device)?;
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     skin.scatter(&gpu.device, &gpu.queue, &mut encoder, &frame)?;
+    atlas.scatter(&gpu.device, &mut encoder, &unrolled)?;
     gpu.queue.submit([encoder.finish()]);
 
-    let width = frame.scattered.texture().width() as usize;
-    let pixels = gpu.read(&frame.scattered);
-    println!("   mm   red  green   blue");
+    let screen = gpu.read(&frame.scattered);
+    let texture = gpu.read(&unrolled.scattered);
+    println!("        screen space         texture space");
+    println!("   mm   red  green   blue    red  green   blue");
+    let [width, _] = SIZE.map(|s| s as usize);
     for x in (width / 2 - 12..width / 2 + 12).step_by(2) {
-        let [r, g, b, _] = pixels[x];
-        let mm = (x as f32 + 0.5 - width as f32 / 2.0) / 4.0;
-        println!("{mm:5.2} {r:6.3} {g:6.3} {b:6.3}");
+        let mm = (x as f32 + 0.5 - width as f32 / 2.0) / PX_PER_MM;
+        let ([r, g, b, _], [s, t, u, _]) = (screen[x], texture[x]);
+        println!("{mm:5.2} {r:6.3} {g:6.3} {b:6.3} {s:6.3} {t:6.3} {u:6.3}");
     }
     Ok(())
 }
 
-/// A plane half a metre away, 4 pixels a millimetre, dark on the left and lit on the right.
+const SIZE: [u32; 2] = [128, 64];
+const PX_PER_MM: f32 = 4.0;
+
+/// Dark on the left, lit on the right.
+fn light() -> Vec<[f32; 4]> {
+    let lit = |i: u32| f32::from(u8::from(i % SIZE[0] >= SIZE[0] / 2));
+    (0..SIZE[0] * SIZE[1]).map(|i| [lit(i); 4]).collect()
+}
+
+/// A plane half a metre away.
 fn made_up_frame(gpu: &Gpu) -> Frame {
-    let size = [128, 64];
-    let lit = |i: u32| f32::from(u8::from(i % size[0] >= size[0] / 2));
-    let each_pixel = 0..size[0] * size[1];
-    let irradiance: Vec<_> = each_pixel.clone().map(|i| [lit(i); 4]).collect();
-    let depth: Vec<f32> = each_pixel.clone().map(|_| 0.5).collect();
-    let profile_id: Vec<u8> = each_pixel.map(|_| 1).collect();
-    let (half_width, half_height) = (0.016, 0.008);
+    let count = (SIZE[0] * SIZE[1]) as usize;
+    let half = SIZE.map(|s| s as f32 / PX_PER_MM / 2000.0);
     Frame {
-        irradiance: gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &irradiance),
-        depth: gpu.upload("depth", size, TextureFormat::R32Float, &depth),
-        profile_id: gpu.upload("profile id", size, TextureFormat::R8Uint, &profile_id),
-        scattered: gpu.target("scattered", size, TextureFormat::Rgba16Float),
+        irradiance: gpu.upload("irradiance", SIZE, TextureFormat::Rgba32Float, &light()),
+        depth: gpu.upload("depth", SIZE, TextureFormat::R32Float, &vec![0.5f32; count]),
+        profile_id: gpu.upload("profile id", SIZE, TextureFormat::R8Uint, &vec![1u8; count]),
+        scattered: gpu.target("scattered", SIZE, TextureFormat::Rgba16Float),
         // Orthographic, a metre deep.
         projection: glam::camera::rh::proj::directx::orthographic(
-            -half_width,
-            half_width,
-            -half_height,
-            half_height,
-            0.0,
-            1.0,
+            -half[0], half[0], -half[1], half[1], 0.0, 1.0,
         ),
+    }
+}
+
+/// The same plane, unrolled.
+fn made_up_atlas(gpu: &Gpu) -> Unrolled {
+    let metres = |texels: u32| texels as f32 / PX_PER_MM / 1000.0;
+    let point = |i: u32| [metres(i % SIZE[0]), metres(i / SIZE[0]), -0.5, 1.0];
+    let positions: Vec<[f32; 4]> = (0..SIZE[0] * SIZE[1]).map(point).collect();
+    let full = TextureFormat::Rgba32Float;
+    Unrolled {
+        irradiance: gpu.upload("irradiance of the atlas", SIZE, full, &light()),
+        positions: gpu.upload("positions", SIZE, full, &positions),
+        scattered: gpu.target("scattered atlas", SIZE, TextureFormat::Rgba16Float),
     }
 }

@@ -71,6 +71,17 @@ struct Point {
     profile: u32,
 }
 
+// Whether light is a number. By its bits, since compilers may take for granted that it is.
+fn is_finite(light: vec3f) -> bool {
+    return all((bitcast<vec3u>(light) & vec3u(0x7f800000u)) != vec3u(0x7f800000u));
+}
+
+// A pixel's own light, or none where that is no number.
+fn own_light(pixel: vec2i) -> vec3f {
+    let light = irradiance_at(pixel).rgb;
+    return select(vec3f(0.0), light, is_finite(light));
+}
+
 fn irradiance_at(pixel: vec2i) -> vec4f {
     return textureLoad(irradiance, vec2i(settings.first_pixel) + pixel, 0);
 }
@@ -191,11 +202,6 @@ fn weight(distance2_mm2: f32, variance_mm2: f32) -> f32 {
 fn distance2(a: vec3f, b: vec3f) -> f32 {
     let d = a - b;
     return dot(d, d);
-}
-
-// Whether light is a number. By its bits, since compilers may take for granted that it is.
-fn is_finite(light: vec3f) -> bool {
-    return all((bitcast<vec3u>(light) & vec3u(0x7f800000u)) != vec3u(0x7f800000u));
 }
 
 // E·A and A; nothing where the light is no number, so that it goes no further.
@@ -376,20 +382,20 @@ fn fs_sum(vertex: Vertex) -> @location(0) vec4f {
     }
     if total.a <= 0.0 {
         // No area to speak of: nothing to share with.
-        return vec4f(before + g.rgb * irradiance_at(pixel).rgb, 1.0);
+        return vec4f(before + g.rgb * own_light(pixel), 1.0);
     }
     return vec4f(before + g.rgb * total.rgb / total.a, 1.0);
 }
 
-// The sum at a pixel of the surface, as much of it as the pixel takes; `before` bit for bit where that
+// The sum at a pixel of the surface, as much of it as the pixel takes; its light bit for bit where that
 // is none.
-fn taken(pixel: vec2i, before: vec3f) -> vec3f {
+fn taken(pixel: vec2i) -> vec3f {
     let scattered = textureLoad(sum, pixel, 0).rgb;
     if settings.has_strength == 0u {
         return scattered;
     }
     let share = saturate(textureLoad(strength, vec2i(settings.first_pixel) + pixel, 0).r);
-    return select(mix(before, scattered, share), before, share <= 0.0);
+    return select(mix(own_light(pixel), scattered, share), irradiance_at(pixel).rgb, share <= 0.0);
 }
 
 // The result: the sum on the surface, carried into the gutter, and the input as it was elsewhere.
@@ -398,7 +404,7 @@ fn fs_resolve(vertex: Vertex) -> @location(0) vec4f {
     let pixel = vec2i(vertex.position.xy) - vec2i(settings.first_pixel);
     let before = irradiance_at(pixel);
     if point(pixel).profile != 0u {
-        return vec4f(taken(pixel, before.rgb), before.a);
+        return vec4f(taken(pixel), before.a);
     }
     for (var ring = 1; ring <= settings.gutter; ring++) {
         var total = vec4f(0.0);
@@ -427,5 +433,6 @@ fn fs_difference(vertex: Vertex) -> @location(0) vec4f {
         discard;
     }
     let before = irradiance_at(pixel).rgb;
-    return vec4f(taken(pixel, before) - before, 0.0);
+    // Nothing can be added to what is no number.
+    return vec4f(select(vec3f(0.0), taken(pixel) - before, is_finite(before)), 0.0);
 }

@@ -71,9 +71,11 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     let south = select(below - z, z - above, pixel.y == last.y);
     // Twice as much at each level; half of it is what a pixel is off the plane of its neighbour.
     let bend = max(abs(east - west) / mm.x, abs(south - north) / mm.y);
-    if bend > FLAT / f32(1u << (FLAT_LEVELS - 1u)) {
-        // 0 where all levels are bent, FLAT_LEVELS − 1 where the last is.
-        let flat_levels = u32(max(ceil(log2(FLAT / bend)), 0.0));
+    let light = textureLoad(irradiance, pixel_of_host, 0).rgb;
+    let is_light = is_finite(light);
+    if bend > FLAT / f32(1u << (FLAT_LEVELS - 1u)) || !is_light {
+        // 0 where all levels are bent, FLAT_LEVELS − 1 where the last is. Simple tiles have light.
+        let flat_levels = select(0u, u32(max(ceil(log2(FLAT / bend)), 0.0)), is_light);
         let columns = (u32(size.x) + TILE - 1u) / TILE;
         let tile = vec2u(pixel) / TILE;
         atomicOr(&bends[tile.y * columns + tile.x], (1u << FLAT_LEVELS) - (1u << flat_levels));
@@ -87,9 +89,8 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     }
     let plane = plane_of(pixel, shape);
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
-    let light = textureLoad(irradiance, pixel_of_host, 0).rgb;
     let sines = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);
     // Light that is no number goes no further. What is packed is half floats, which end there.
-    let packed_light = select(vec4f(0.0), vec4f(min(light, vec3f(65504.0)), area), is_finite(light));
+    let packed_light = select(vec4f(0.0), vec4f(min(light, vec3f(65504.0)), area), is_light);
     return Surface(half_floats(packed_light), packed(id, z, sines));
 }

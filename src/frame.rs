@@ -54,11 +54,11 @@ pub struct ScreenFrame<'a> {
 /// Normals of the surface, not of a normal map: the area of skin that a pixel shows follows from them.
 #[derive(Clone, Copy, Debug)]
 pub struct Normals<'a> {
-    /// X, y and z in three or four channels of a float, snorm or unorm format; of unorm ones, 0 to 1
-    /// stands for -1 to 1. Less than .1 long: none.
+    /// X, y and z in a float, snorm or unorm format of four channels; of unorm ones, 0 to 1
+    /// stands for -1 to 1, so that .5 in all is none: as what is less than .1 long.
     pub texture: &'a TextureView,
     /// Rotates them to view space: the identity where they are there already, the upper 3×3 of the view
-    /// matrix where they are in world space.
+    /// matrix where they are in world space. It mirrors z where the projection was made to.
     pub to_view: Mat3,
 }
 
@@ -84,13 +84,13 @@ pub enum Output {
     /// which a final pass multiplies by albedo. Three or four float channels.
     Scattered(TextureFormat),
     /// The same, added to what is there: for a target that lacks the diffuse light. The irradiance must be
-    /// that light, times its albedo, which then is scattered, too. A format that this device blends.
+    /// that light, times its albedo, which then is scattered, too. Rgba16Float, or Rgba32Float on devices
+    /// that blend it.
     AddScattered(TextureFormat),
     /// What scattering changes, added to what is there: for a target that has the diffuse light
     /// already, so that a frame without the effect is right, too. The irradiance must be what is in the
     /// target, times its albedo, in a texture of its own. Red, green and blue; what does not scatter is
-    /// not touched. Rgba16Float, or Rgba32Float on devices that blend it, since a difference may be
-    /// negative.
+    /// not touched. Formats as for `AddScattered`.
     AddDifference(TextureFormat),
 }
 
@@ -283,7 +283,9 @@ impl Optics {
         }
         let distance = |depth: f32| {
             let z = inverse.z_axis.z * depth + inverse.w_axis.z;
-            (z / (inverse.z_axis.w * depth + inverse.w_axis.w)).abs()
+            let z = z / (inverse.z_axis.w * depth + inverse.w_axis.w);
+            // An orthographic camera may see what is behind it, farther than what is before it.
+            if w.z == 0.0 { -z } else { z.abs() }
         };
         let far = if distance(0.0) > distance(1.0) {
             0.0

@@ -49,8 +49,15 @@ pub(crate) fn check_texture(
             "one unsigned integer channel".into(),
         ),
         Role::Normal => (
-            float && format.components() >= 3 && !format.is_srgb(),
-            "three or four float, snorm or unorm channels".into(),
+            is_unorm(format)
+                || matches!(
+                    format,
+                    TextureFormat::Rgba16Float
+                        | TextureFormat::Rgba32Float
+                        | TextureFormat::Rgba8Snorm
+                        | TextureFormat::Rgba16Snorm
+                ),
+            "three signed channels, or unorm ones that stand for them".into(),
         ),
         Role::Strength => (
             float && !format.has_depth_aspect(),
@@ -170,11 +177,11 @@ pub(crate) fn check_output(device: &wgpu::Device, output: Output) -> Result<(), 
         format,
         TextureFormat::Rgba16Float | TextureFormat::Rgba32Float
     );
-    if output.is_difference() && !signed {
+    if output.adds() && !signed {
         return Err(Error::new(
             "output: format",
             format!("{format:?}"),
-            "Rgba16Float or Rgba32Float, since a difference may be negative",
+            "Rgba16Float or Rgba32Float, since what is added may be negative",
         ));
     }
     Ok(())

@@ -17,7 +17,8 @@ use crate::{Error, Output, Plan, ScreenFrame, ScreenSpace};
 /// clearing and the copy of what does not scatter go over the frame. Between passes light is half
 /// floats, and held at their largest, 65504. View space is right-handed. Views that share a
 /// submission need an effect each, since the numbers of a frame are uploaded when it is prepared. A
-/// frame of the same size, textures and plan as the one before makes nothing anew.
+/// frame of the same size, views and plan as the one before makes nothing anew; the views are kept until
+/// the next is prepared.
 ///
 /// Scratch memory: 23.9 bytes a pixel; 80 where the plan is exact.
 pub struct PlannedScreenSpace {
@@ -31,8 +32,8 @@ impl PlannedScreenSpace {
     /// The effect that writes this output: a format such as Rgba16Float, or an [`Output`].
     ///
     /// # Errors
-    /// A format that cannot be rendered to, or blended, on this device; a device with less than WebGPU's
-    /// default limits.
+    /// A format that cannot be rendered to, or blended, on this device; a device that allows fewer than
+    /// 6 storage buffers a stage or 64 threads a workgroup, less than WebGPU's default limits.
     pub fn new(device: &Device, output: impl Into<Output>) -> Result<Self, Error> {
         let output = output.into();
         crate::input::check_output(device, output)?;
@@ -41,11 +42,11 @@ impl PlannedScreenSpace {
             limits.max_storage_buffers_per_shader_stage,
             limits.max_compute_invocations_per_workgroup,
         );
-        if buffers < 6 || threads < 256 {
+        if buffers < 6 || threads < 64 {
             return Err(Error::new(
                 "device: limits",
                 format!("{buffers} storage buffers a stage, {threads} threads a workgroup"),
-                "6 and 256; WebGPU's defaults are 8 and 256",
+                "6 and 64; WebGPU's defaults are 8 and 256",
             ));
         }
         Ok(Self {
