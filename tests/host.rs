@@ -215,6 +215,82 @@ fn a_viewport_is_a_frame_of_its_own() {
     }
 }
 
+/// What an effect keeps from frame to frame is never of another frame.
+#[test]
+fn one_effect_serves_frames_that_change() {
+    let gpu = gpu();
+    let more = Scene::new().within_more();
+    let output = gpu.target("output", more.size, HALF);
+    let irradiance = gpu.upload("irradiance", more.size, HALF, &halves(&more.irradiance));
+    let depth = gpu.upload("depth", more.size, TextureFormat::R32Float, &more.depth);
+    let id = gpu.upload("id", more.size, TextureFormat::R8Uint, &more.id);
+    let first = ScreenFrame {
+        irradiance: &irradiance,
+        depth: &depth,
+        profile_id: Some(&id),
+        normal: None,
+        strength: None,
+        viewport: Some(PLACE),
+        output: &output,
+        projection: more.projection,
+        mm_per_unit: 1.0,
+        profiles: &[Profile::SKIN],
+    };
+    let moved = Viewport {
+        x: 0,
+        y: 3,
+        ..PLACE
+    };
+    let frames = [
+        first,
+        ScreenFrame {
+            viewport: Some(moved),
+            ..first
+        },
+        ScreenFrame {
+            viewport: None,
+            ..first
+        },
+        ScreenFrame {
+            mm_per_unit: 3.0,
+            ..first
+        },
+        ScreenFrame {
+            profile_id: None,
+            ..first
+        },
+        first,
+    ];
+    let mut exact = ScreenSpace::new(&gpu.device, HALF).unwrap();
+    let mut planned = PlannedScreenSpace::new(&gpu.device, HALF).unwrap();
+    let seen = |effect: &mut dyn FnMut(&mut CommandEncoder)| {
+        let nothing = vec![[0.0; 4]; more.depth.len()];
+        let cleared = gpu.upload("cleared", more.size, HALF, &halves(&nothing));
+        gpu.run(|encoder| {
+            let [from, to] = [&cleared, &output].map(|view| view.texture().as_image_copy());
+            encoder.copy_texture_to_texture(from, to, cleared.texture().size());
+            effect(encoder);
+        });
+        gpu.read(&output)
+    };
+    for (i, frame) in frames.iter().enumerate() {
+        for by_plan in [false, true] {
+            let anew = seen(&mut |encoder| record(by_plan, HALF.into(), frame, encoder));
+            let kept = seen(&mut |encoder| {
+                if by_plan {
+                    let prepared = planned.prepare(&gpu.device, &gpu.queue, frame, plan());
+                    prepared.unwrap();
+                    planned.render(encoder);
+                } else {
+                    exact.prepare(&gpu.device, frame).unwrap();
+                    exact.render(encoder);
+                }
+            });
+            assert_eq!(kept, anew, "frame {i}, planned: {by_plan}");
+        }
+    }
+}
+
 #[test]
 fn without_ids_all_before_the_far_plane_scatters() {
     let scene = Scene::new();
