@@ -71,11 +71,6 @@ struct Point {
     profile: u32,
 }
 
-// Whether light is a number. By its bits, since compilers may take for granted that it is.
-fn is_finite(light: vec3f) -> bool {
-    return all((bitcast<vec3u>(light) & vec3u(0x7f800000u)) != vec3u(0x7f800000u));
-}
-
 // A pixel's own light, or none where that is no number.
 fn own_light(pixel: vec2i) -> vec3f {
     let light = irradiance_at(pixel).rgb;
@@ -142,12 +137,14 @@ fn metric(pixel: vec2i, here: Point) -> Metric {
     let is_screen = any(settings.spacing != vec4f(0.0));
     var tx = tangent(pixel, vec2i(1, 0), here);
     var ty = tangent(pixel, vec2i(0, 1), here);
-    let ray = settings.rays.xy + settings.rays.zw * (vec2f(pixel) + 0.5);
-    let texel = textureLoad(normal, vec2i(settings.first_pixel) + pixel, 0).xyz;
-    let slope = slope_by_normal(settings.normals, texel, ray, mm);
-    if slope.is_known {
-        tx = vec3f(ray * slope.dz.x + vec2f(mm.x, 0.0), slope.dz.x);
-        ty = vec3f(ray * slope.dz.y + vec2f(0.0, mm.y), slope.dz.y);
+    if settings.normals.has != 0u {
+        let ray = settings.rays.xy + settings.rays.zw * (vec2f(pixel) + 0.5);
+        let texel = textureLoad(normal, vec2i(settings.first_pixel) + pixel, 0).xyz;
+        let slope = slope_by_normal(settings.normals, texel, ray, mm);
+        if slope.is_known {
+            tx = vec3f(ray * slope.dz.x + vec2f(mm.x, 0.0), slope.dz.x);
+            ty = vec3f(ray * slope.dz.y + vec2f(0.0, mm.y), slope.dz.y);
+        }
     }
     let xx = dot(tx, tx);
     let yy = dot(ty, ty);

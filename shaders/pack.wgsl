@@ -35,11 +35,6 @@ fn tangent(forward: f32, backward: f32, mm: f32) -> f32 {
     return select(0.0, dz / mm, abs(dz) < 40.0 * mm);
 }
 
-// Whether light is a number. By its bits, since compilers may take for granted that it is.
-fn is_finite(light: vec3f) -> bool {
-    return all((bitcast<vec3u>(light) & vec3u(0x7f800000u)) != vec3u(0x7f800000u));
-}
-
 @fragment
 fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     let pixel = vec2i(at.xy);
@@ -81,11 +76,13 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
         atomicOr(&bends[tile.y * columns + tile.x], (1u << FLAT_LEVELS) - (1u << flat_levels));
     }
     var shape = Shape(id, z, vec2f(tangent(east, west, mm.x), tangent(south, north, mm.y)));
-    let texel = textureLoad(normal, pixel_of_host, 0).xyz;
-    let signed_mm = view.step.xy * z + view.step.zw;
-    let slope = slope_by_normal(normals, texel, ray(pixel).xy, signed_mm);
-    if slope.is_known {
-        shape.tangent = slope.dz / mm;
+    if normals.has != 0u {
+        let texel = textureLoad(normal, pixel_of_host, 0).xyz;
+        let signed_mm = view.step.xy * z + view.step.zw;
+        let slope = slope_by_normal(normals, texel, ray(pixel).xy, signed_mm);
+        if slope.is_known {
+            shape.tangent = slope.dz / mm;
+        }
     }
     let plane = plane_of(pixel, shape);
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);

@@ -84,12 +84,12 @@ pub enum Output {
     /// which a final pass multiplies by albedo. Three or four float channels.
     Scattered(TextureFormat),
     /// The same, added to what is there: for a target that lacks the diffuse light. The irradiance must be
-    /// that light, times its albedo, which then is scattered, too. Rgba16Float, or Rgba32Float on devices
+    /// that light with its albedo, which then is scattered, too. Rgba16Float, or Rgba32Float on devices
     /// that blend it.
     AddScattered(TextureFormat),
     /// What scattering changes, added to what is there: for a target that has the diffuse light
-    /// already, so that a frame without the effect is right, too. The irradiance must be what is in the
-    /// target, times its albedo, in a texture of its own. Red, green and blue; what does not scatter is
+    /// already, so that a frame without the effect is right, too. The irradiance must be that light as it is
+    /// in the target, albedo included, in a texture of its own. Red, green and blue; what does not scatter is
     /// not touched. Formats as for `AddScattered`.
     AddDifference(TextureFormat),
 }

@@ -25,7 +25,7 @@ const STRENGTH: u32 = 6;
 const NORMAL: u32 = 7;
 
 const SHADER: &str = concat!(
-    include_str!("../shaders/normals.wgsl"),
+    include_str!("../shaders/host.wgsl"),
     include_str!("../shaders/gaussian_sum.wgsl")
 );
 

@@ -23,7 +23,7 @@ macro_rules! over_surface {
     };
 }
 pub(super) const PACK: &str = concat!(
-    include_str!("../../shaders/normals.wgsl"),
+    include_str!("../../shaders/host.wgsl"),
     over_surface!("pack.wgsl")
 );
 const HALVE: &str = over_surface!("halve.wgsl");
