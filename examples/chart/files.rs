@@ -6,10 +6,10 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::output::png;
-use crate::plot::svg::Rasteriser;
 use crate::plot::{EQ7, Series, VISIBLE, error_time, heads, width};
 use crate::report::{self, SceneImages};
 use crate::row::Row;
+use crate::svg::Rasteriser;
 
 /// What was measured.
 pub struct Chart<'a> {

@@ -11,6 +11,7 @@ mod files;
 mod fixture;
 mod heads;
 mod lab;
+#[path = "../shared/method.rs"]
 mod method;
 #[path = "../shared/metrics.rs"]
 mod metrics;
@@ -22,10 +23,13 @@ mod page;
 mod plot;
 mod progress;
 mod report;
+#[path = "../shared/rivals/mod.rs"]
 mod rivals;
 mod row;
 mod scene;
 mod score;
+#[path = "../shared/svg.rs"]
+mod svg;
 mod truths;
 
 use std::hash::{DefaultHasher, Hasher};

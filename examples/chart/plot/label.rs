@@ -1,6 +1,6 @@
 //! Where labels go, so that they do not lie on one another.
 
-use crate::plot::svg::Point;
+use crate::svg::Point;
 
 /// A part of the drawing.
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,6 @@ mod label;
 mod panel;
 pub mod scale;
 pub mod style;
-pub mod svg;
 
 use serde::{Deserialize, Serialize};
 use subsurface::Profile;
@@ -13,8 +12,8 @@ use crate::plot::label::Area;
 use crate::plot::panel::{Curve, DIM, FRONT, LEADER, LEGEND, Panel, SMALL, TITLE};
 use crate::plot::scale::{Scale, Tick};
 use crate::plot::style::{COPY, NONE, Style, distinct, styles};
-use crate::plot::svg::{Svg, Type, text_width};
 use crate::row::Row;
+use crate::svg::{Svg, Type, text_width};
 
 /// Frames a second against the number of heads.
 #[derive(Clone, Debug, Deserialize, Serialize)]

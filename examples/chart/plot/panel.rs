@@ -3,8 +3,8 @@
 use crate::plot::label::{Area, beside, spread};
 use crate::plot::scale::{Scale, Tick, rounded};
 use crate::plot::style::{COPY, NONE, Style};
-use crate::plot::svg::{Point, Stroke, Svg, Type, text_width};
 use crate::row::Row;
+use crate::svg::{Point, Stroke, Svg, Type, text_width};
 
 pub const INK: &str = "#222";
 pub const DIM: &str = "#4a4a4a";

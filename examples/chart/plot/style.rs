@@ -1,6 +1,6 @@
 //! How a method looks in every picture: its name for people, its colour and its shape.
 
-use crate::plot::svg::Marker;
+use crate::svg::Marker;
 
 /// Does nothing: the light as it fell.
 pub const NONE: &str = "none";

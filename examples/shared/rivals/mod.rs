@@ -1,4 +1,4 @@
-//! The methods that the chart compares with, each written from its published formulas. All take
+//! The methods of others that ours are compared with, each written from its published formulas. All take
 //! what `subsurface` takes and give what it gives: irradiance in, scattered irradiance out, whatever
 //! has no profile untouched. They need no feature and no more than WebGPU's default limits, keep
 //! half floats between passes as their authors do, and have their taps written out.

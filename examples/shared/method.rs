@@ -1,4 +1,4 @@
-//! What the chart times: a way to scatter a frame, or an atlas. Each takes what a host hands over
+//! What the examples compare: a way to scatter a frame, or an atlas. Each takes what a host hands over
 //! and gives what a host gets back.
 
 use subsurface::wgpu::{CommandEncoder, Device, Queue};
@@ -8,9 +8,9 @@ use subsurface::{
 
 /// A method over a frame of a deferred renderer.
 pub trait ScreenMethod {
-    /// Checks and uploads; not timed.
+    /// Checks and uploads; the chart does not time it.
     fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<(), Error>;
-    /// Records the frame that was last prepared; timed.
+    /// Records the frame that was last prepared; the chart times it.
     fn render(&self, encoder: &mut CommandEncoder);
     /// Texel fetches for a pixel of skin that faces the camera at `px_per_mm`, where they can be
     /// counted.
@@ -21,9 +21,9 @@ pub trait ScreenMethod {
 
 /// A method over an atlas.
 pub trait AtlasMethod {
-    /// Checks and uploads; not timed.
+    /// Checks and uploads; the chart does not time it.
     fn prepare(&mut self, device: &Device, atlas: &Atlas) -> Result<(), Error>;
-    /// Records the atlas that was last prepared; timed.
+    /// Records the atlas that was last prepared; the chart times it.
     fn render(&self, encoder: &mut CommandEncoder);
     /// Textures of its own, in bytes a texel of the atlas.
     fn scratch_bytes_per_texel(&self) -> f64;

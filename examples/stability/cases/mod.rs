@@ -1,0 +1,82 @@
+//! The cases, a file a group.
+
+mod files;
+mod hosts;
+mod numbers;
+mod screen;
+mod texture;
+mod time;
+
+use glam::{DVec3, Vec3};
+
+use crate::case::{Case, Shown};
+
+/// All of them; `quick` makes frames smaller and sequences shorter.
+pub fn all(quick: bool) -> Vec<Case> {
+    [
+        screen::cases(quick),
+        texture::cases(quick),
+        time::cases(quick),
+        numbers::cases(quick),
+        hosts::cases(quick),
+        files::cases(quick),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}
+
+/// A result of every method: of all pixels of a frame, row by row.
+pub type Results = Vec<(&'static str, Vec<Vec3>)>;
+
+/// Each method's largest difference to the truth in any channel, over the pixels that it is known of;
+/// not a number where a difference is none.
+pub fn worst(results: &Results, truth: &[(usize, DVec3)]) -> Vec<(&'static str, f64)> {
+    assert!(!truth.is_empty(), "a case asks for some pixels");
+    let of = |pixels: &[Vec3]| {
+        let differences = truth
+            .iter()
+            .map(|(i, t)| (pixels[*i].as_dvec3() - t).abs())
+            .flat_map(|d| d.to_array());
+        // `max` would lose what is not a number.
+        differences.fold(0.0, |a: f64, b| if b <= a { a } else { b })
+    };
+    results.iter().map(|(name, r)| (*name, of(r))).collect()
+}
+
+/// A rectangle of a frame: first column and row, columns and rows.
+#[derive(Clone, Copy)]
+pub struct Crop {
+    pub first: [u32; 2],
+    pub size: [u32; 2],
+}
+
+impl Crop {
+    /// Its pixels in a frame that is `width` wide, row by row.
+    pub fn pixels(self, width: u32) -> Vec<usize> {
+        let [x, y] = self.first;
+        let rows = y..y + self.size[1];
+        let row = |y| (x..x + self.size[0]).map(move |x| (y * width + x) as usize);
+        rows.flat_map(row).collect()
+    }
+
+    /// What a picture shows of it; light that no truth is known of is black there.
+    pub fn show(self, width: u32, results: &Results, truth: &[(usize, DVec3)]) -> Shown {
+        let pixels = self.pixels(width);
+        let known = |i: &usize| {
+            let place = truth.binary_search_by_key(i, |(j, _)| *j).ok();
+            place.map(|p| truth[p].1.as_vec3())
+        };
+        let known: Vec<Option<Vec3>> = pixels.iter().map(known).collect();
+        let cut = |values: &[Vec3]| {
+            let pairs = pixels.iter().zip(&known);
+            let cut = pairs.map(|(i, t)| t.map_or(Vec3::ZERO, |_| values[*i]));
+            cut.collect()
+        };
+        Shown {
+            size: self.size,
+            truth: known.iter().map(|t| t.unwrap_or_default()).collect(),
+            results: results.iter().map(|(m, r)| (*m, cut(r))).collect(),
+        }
+    }
+}
