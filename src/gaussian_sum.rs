@@ -196,26 +196,40 @@ impl GaussianSum {
         });
     }
 
-    pub fn render(&self, encoder: &mut CommandEncoder) {
+    /// Records the frame, and calls `after` with the label of each pass.
+    pub fn render(
+        &self,
+        encoder: &mut CommandEncoder,
+        after: &mut dyn FnMut(&str, &mut CommandEncoder),
+    ) {
         let (Some(scratch), Some(frame)) = (&self.scratch, &self.frame) else {
             return;
         };
-        self.source.draw(encoder, &frame.source, &scratch.source, 0);
+        let mut draw = |name: &str, pass: &Pass, group, to, i| {
+            let label = format!("{} {name}", self.label);
+            draw_full_screen(encoder, &label, &pass.pipeline, group, to, i);
+            after(&label, encoder);
+        };
+        draw("source", &self.source, &frame.source, &scratch.source, 0);
         for i in 0..frame.gaussians {
             let from = i as usize % 2;
-            self.rows.draw(encoder, &frame.rows, &scratch.rows, i);
-            self.sum
-                .draw(encoder, &frame.sums[from], &scratch.sums[1 - from], i);
+            let (group, to) = (&frame.sums[from], &scratch.sums[1 - from]);
+            let along = |what| format!("Gaussian {} along {what}", i + 1);
+            draw(&along("rows"), &self.rows, &frame.rows, &scratch.rows, i);
+            draw(&along("columns"), &self.sum, group, to, i);
         }
-        let keeps = self.output.adds() || frame.viewport.is_some();
-        let label = &self.resolve.label;
-        let mut pass = begin(encoder, label, &[&frame.output], keeps);
-        if let Some(viewport) = frame.viewport {
-            viewport.apply(&mut pass);
+        let label = format!("{} resolve", self.label);
+        {
+            let keeps = self.output.adds() || frame.viewport.is_some();
+            let mut pass = begin(encoder, &label, &[&frame.output], keeps);
+            if let Some(viewport) = frame.viewport {
+                viewport.apply(&mut pass);
+            }
+            pass.set_pipeline(&self.resolve.pipeline);
+            pass.set_bind_group(0, &frame.resolve, &[]);
+            pass.draw(0..3, 0..1);
         }
-        pass.set_pipeline(&self.resolve.pipeline);
-        pass.set_bind_group(0, &frame.resolve, &[]);
-        pass.draw(0..3, 0..1);
+        after(&label, encoder);
     }
 }
 
@@ -428,10 +442,6 @@ impl Pass {
             layout: &self.layout,
             entries: &entries,
         })
-    }
-
-    fn draw(&self, encoder: &mut CommandEncoder, group: &BindGroup, to: &TextureView, i: u32) {
-        draw_full_screen(encoder, &self.label, &self.pipeline, group, to, i);
     }
 }
 

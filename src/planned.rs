@@ -121,9 +121,20 @@ impl PlannedScreenSpace {
 
     /// Records the frame that was last prepared; nothing before the first.
     pub fn render(&self, encoder: &mut CommandEncoder) {
+        self.render_by_pass(encoder, |_, _| ());
+    }
+
+    /// Records as [`render`](Self::render), and calls `after` with the label of each pass once that is
+    /// recorded. There, timestamps can be written; or what is recorded so far submitted, with a new encoder
+    /// in the place of the old one.
+    pub fn render_by_pass(
+        &self,
+        encoder: &mut CommandEncoder,
+        mut after: impl FnMut(&str, &mut CommandEncoder),
+    ) {
         match &self.exact {
-            Some(exact) => exact.render(encoder),
-            None => self.pyramid.render(encoder),
+            Some(exact) => exact.render_by_pass(encoder, after),
+            None => self.pyramid.render(encoder, &mut after),
         }
     }
 }

@@ -154,16 +154,23 @@ impl ScreenSpace {
 
     /// Records the frame that was last prepared; nothing before the first.
     pub fn render(&self, encoder: &mut CommandEncoder) {
+        self.render_by_pass(encoder, |_, _| ());
+    }
+
+    /// Records as [`render`](Self::render), and calls `after` with the label of each pass once that is
+    /// recorded. There, timestamps can be written; or what is recorded so far submitted, with a new encoder
+    /// in the place of the old one.
+    pub fn render_by_pass(
+        &self,
+        encoder: &mut CommandEncoder,
+        mut after: impl FnMut(&str, &mut CommandEncoder),
+    ) {
         if let (Some(positions), Some(group)) = (&self.positions, &self.group) {
-            gaussian_sum::draw_full_screen(
-                encoder,
-                "subsurface::ScreenSpace positions",
-                &self.pipeline,
-                group,
-                positions,
-                0,
-            );
-            self.sum.render(encoder);
+            let label = "subsurface::ScreenSpace positions";
+            let pipeline = &self.pipeline;
+            gaussian_sum::draw_full_screen(encoder, label, pipeline, group, positions, 0);
+            after(label, encoder);
+            self.sum.render(encoder, &mut after);
         }
     }
 }

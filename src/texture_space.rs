@@ -110,6 +110,17 @@ impl TextureSpace {
 
     /// Records the atlas that was last prepared; nothing before the first.
     pub fn render(&self, encoder: &mut CommandEncoder) {
-        self.sum.render(encoder);
+        self.render_by_pass(encoder, |_, _| ());
+    }
+
+    /// Records as [`render`](Self::render), and calls `after` with the label of each pass once that is
+    /// recorded. There, timestamps can be written; or what is recorded so far submitted, with a new encoder
+    /// in the place of the old one.
+    pub fn render_by_pass(
+        &self,
+        encoder: &mut CommandEncoder,
+        mut after: impl FnMut(&str, &mut CommandEncoder),
+    ) {
+        self.sum.render(encoder, &mut after);
     }
 }

@@ -3,6 +3,7 @@
 
 mod common;
 
+use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
 use common::{View, gpu, plane, sphere};
@@ -37,6 +38,38 @@ fn record(planned: bool, output: Output, frame: &ScreenFrame, encoder: &mut Comm
     }
 }
 
+/// Submits each pass of an effect on its own, and leaves nothing to be submitted.
+fn record_pass_by_pass(
+    planned: bool,
+    output: Output,
+    frame: &ScreenFrame,
+    encoder: &mut CommandEncoder,
+) {
+    let gpu = gpu();
+    let mut labels = Vec::new();
+    let after = |label: &str, encoder: &mut CommandEncoder| {
+        labels.push(label.to_owned());
+        let next = gpu.device.create_command_encoder(&Default::default());
+        gpu.queue
+            .submit([std::mem::replace(encoder, next).finish()]);
+    };
+    if planned {
+        let mut effect = PlannedScreenSpace::new(&gpu.device, output).unwrap();
+        let prepared = effect.prepare(&gpu.device, &gpu.queue, frame, plan());
+        prepared.unwrap();
+        effect.render_by_pass(encoder, after);
+        // Seven levels are halved to, and blurred; the frame is blurred, too.
+        assert_eq!(labels.len(), 3 + 2 * 7 + 1);
+    } else {
+        let mut effect = ScreenSpace::new(&gpu.device, output).unwrap();
+        effect.prepare(&gpu.device, frame).unwrap();
+        effect.render_by_pass(encoder, after);
+        assert_eq!(labels.len(), 2 + 2 * Profile::SKIN.gaussians().len() + 1);
+    }
+    let distinct: BTreeSet<_> = labels.iter().collect();
+    assert_eq!(distinct.len(), labels.len());
+}
+
 /// A sphere before nothing, in half floats.
 struct Scene {
     size: [u32; 2],
@@ -50,6 +83,7 @@ struct Scene {
 #[derive(Default)]
 struct Asked<'a> {
     no_ids: bool,
+    pass_by_pass: bool,
     strength: Option<&'a TextureView>,
     viewport: Option<Viewport>,
 }
@@ -149,7 +183,10 @@ impl Scene {
             mm_per_unit: 1.0,
             profiles: &[Profile::SKIN],
         };
-        gpu.run(|encoder| record(planned, output, &frame, encoder));
+        gpu.run(|encoder| match asked.pass_by_pass {
+            false => record(planned, output, &frame, encoder),
+            true => record_pass_by_pass(planned, output, &frame, encoder),
+        });
         gpu.read(&to)
     }
 
@@ -288,6 +325,19 @@ fn one_effect_serves_frames_that_change() {
             });
             assert_eq!(kept, anew, "frame {i}, planned: {by_plan}");
         }
+    }
+}
+
+#[test]
+fn passes_may_be_submitted_one_by_one() {
+    let scene = Scene::new();
+    for planned in [false, true] {
+        let asked = Asked {
+            pass_by_pass: true,
+            ..Asked::default()
+        };
+        let at_once = scene.scattered(planned, Asked::default());
+        assert_eq!(scene.scattered(planned, asked), at_once);
     }
 }
 

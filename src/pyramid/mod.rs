@@ -151,7 +151,12 @@ impl Pyramid {
         self.scratch = None;
     }
 
-    pub fn render(&self, encoder: &mut CommandEncoder) {
+    /// Records the frame, and calls `after` with the label of each pass.
+    pub fn render(
+        &self,
+        encoder: &mut CommandEncoder,
+        after: &mut dyn FnMut(&str, &mut CommandEncoder),
+    ) {
         let (Some(planned), Some(scratch), Some(frame)) =
             (&self.planned, &self.scratch, &self.frame)
         else {
@@ -165,8 +170,9 @@ impl Pyramid {
             forget_tiles(encoder, level);
         }
         encoder.clear_buffer(&scratch.bends, 0, None);
+        let label = "subsurface tiles";
         {
-            let mut pass = begin_compute(encoder, "subsurface tiles");
+            let mut pass = begin_compute(encoder, label);
             let [x, y] = base.tiles;
             pass.set_pipeline(&passes.mark.pipeline);
             pass.set_bind_group(0, &frame.mark, &[]);
@@ -174,41 +180,58 @@ impl Pyramid {
             // All of the frame's; which of them are simple shows when they are packed.
             gather(&mut pass, &passes.gather, &frame.gather[0], base);
         }
+        after(label, encoder);
+        let label = "subsurface pack";
         {
             let targets = [&base.light, &base.shape];
-            let mut pass = begin(encoder, "subsurface pack", &targets, false);
+            let mut pass = begin(encoder, label, &targets, false);
             over_tiles(&mut pass, passes.pack.each_ref(), &frame.pack, base);
         }
+        after(label, encoder);
         forget_tiles(encoder, base);
+        let label = "subsurface simple tiles";
         {
-            let mut pass = begin_compute(encoder, "subsurface simple tiles");
+            let mut pass = begin_compute(encoder, label);
             for (group, level) in frame.gather.iter().zip(&scratch.levels) {
                 gather(&mut pass, &passes.gather, group, level);
             }
         }
-        for (group, level) in frame.halve.iter().zip(coarser) {
-            let targets = [&level.light, &level.shape];
-            let mut pass = begin(encoder, "subsurface halve", &targets, false);
-            over_tiles(&mut pass, passes.halve.each_ref(), group, level);
+        after(label, encoder);
+        for ((group, level), l) in frame.halve.iter().zip(coarser).zip(1..) {
+            let label = format!("subsurface halve to level {l}");
+            {
+                let targets = [&level.light, &level.shape];
+                let mut pass = begin(encoder, &label, &targets, false);
+                over_tiles(&mut pass, passes.halve.each_ref(), group, level);
+            }
+            after(&label, encoder);
         }
         for l in (1..scratch.levels.len()).rev() {
-            let (group, level) = (&frame.level[l - 1], &scratch.levels[l]);
-            let mut pass = begin(encoder, "subsurface level", &[scratch.mean(l)], false);
-            let [x, y] = level.size.map(|s| s as f32);
-            pass.set_viewport(0.0, 0.0, x, y, 0.0, 1.0);
-            over_tiles(&mut pass, passes.level.each_ref(), group, level);
+            let label = format!("subsurface blur level {l}");
+            {
+                let (group, level) = (&frame.level[l - 1], &scratch.levels[l]);
+                let mut pass = begin(encoder, &label, &[scratch.mean(l)], false);
+                let [x, y] = level.size.map(|s| s as f32);
+                pass.set_viewport(0.0, 0.0, x, y, 0.0, 1.0);
+                over_tiles(&mut pass, passes.level.each_ref(), group, level);
+            }
+            after(&label, encoder);
         }
-        let keeps = self.output.adds() || frame.viewport.is_some();
-        let mut pass = begin(encoder, "subsurface frame", &[&frame.views.output], keeps);
-        if let Some(viewport) = frame.viewport {
-            viewport.apply(&mut pass);
+        let label = "subsurface blur frame";
+        {
+            let keeps = self.output.adds() || frame.viewport.is_some();
+            let mut pass = begin(encoder, label, &[&frame.views.output], keeps);
+            if let Some(viewport) = frame.viewport {
+                viewport.apply(&mut pass);
+            }
+            if !self.output.is_difference() {
+                pass.set_pipeline(&passes.copy.pipeline);
+                pass.set_bind_group(0, &frame.copy, &[]);
+                pass.draw(0..3, 0..1);
+            }
+            over_tiles(&mut pass, passes.frame.each_ref(), &frame.frame, base);
         }
-        if !self.output.is_difference() {
-            pass.set_pipeline(&passes.copy.pipeline);
-            pass.set_bind_group(0, &frame.copy, &[]);
-            pass.draw(0..3, 0..1);
-        }
-        over_tiles(&mut pass, passes.frame.each_ref(), &frame.frame, base);
+        after(label, encoder);
     }
 }
 
