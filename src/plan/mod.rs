@@ -48,6 +48,8 @@ pub struct Row {
     pub px_per_mm: f32,
     /// Light that stays, then each blur of the frame, then each of level 1 and so on.
     pub weights: Vec<Vec3>,
+    /// The coarsest level that has weight in any row up to here; 0 is the frame.
+    pub level: usize,
     /// The largest error on straight edges, up to the next row; in units of white.
     pub predicted_error: f32,
 }
@@ -123,6 +125,14 @@ impl Plan {
         (px_per_mm > 0.0).then(|| weights.fetches(rows, px_per_mm))
     }
 
+    /// Which of [`rows`](Self::rows) tells a tile of skin up to which level it is blurred, by the most
+    /// px/mm that any pixel of its 8×8 has, as if it faced the camera. It is beyond those that weigh the
+    /// blurs there by two to three rows. None for the exact effect, which has no levels.
+    pub fn tile_row(&self, px_per_mm: f32) -> Option<usize> {
+        let weights = self.weights.as_ref()?;
+        (px_per_mm > 0.0).then(|| weights.tile_row(px_per_mm))
+    }
+
     /// The rows of a profile, counted from 0, from the smallest scale to the largest; none of one
     /// that the plan was not made for, or of the exact effect.
     pub fn rows(&self, profile: usize) -> &[Row] {
@@ -156,9 +166,15 @@ impl fmt::Display for Plan {
             writeln!(f)?;
         }
         for (rows, id) in profiles.iter().zip(1..) {
-            writeln!(f, "profile {id}:  px/mm   error    weights")?;
+            writeln!(f, "profile {id}:  px/mm   error    level  weights")?;
             for row in rows {
-                write!(f, "  {:14.4}  {:.5} ", row.px_per_mm, row.predicted_error)?;
+                let Row {
+                    px_per_mm,
+                    predicted_error,
+                    level,
+                    ..
+                } = row;
+                write!(f, "  {px_per_mm:14.4}  {predicted_error:.5}  {level:5} ")?;
                 for w in &row.weights {
                     let [r, g, b] = w.to_array().map(|c| (100.0 * c).round());
                     write!(f, " {r:.0}/{g:.0}/{b:.0}")?;

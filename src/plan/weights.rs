@@ -11,6 +11,9 @@ use crate::Profile;
 /// Rows to an octave of scale; between two of them weights are interpolated.
 pub(crate) const ROWS_PER_OCTAVE: f64 = 6.0;
 
+/// How many rows a tile looks beyond that of its scale, rounded up; as in tiles.wgsl.
+const ROWS_BEYOND: f32 = 2.0;
+
 /// Levels that weights may be for: at the last, a pixel is 128 of the frame's.
 const MAX_LEVELS: usize = 7;
 
@@ -84,13 +87,26 @@ impl Weights {
             };
             fitted.push(rows);
         }
-        let weights = Self {
+        let mut weights = Self {
             kernels,
             levels: MAX_LEVELS,
             first_octave: first,
             profiles: fitted,
         };
+        weights.find_levels();
         (weights.predicted_error() <= max_error).then_some(weights)
+    }
+
+    fn find_levels(&mut self) {
+        let slots: Vec<usize> = (1..=self.levels + 1).map(|l| self.slot(l, 0)).collect();
+        for rows in &mut self.profiles {
+            let mut level = 0;
+            for row in rows {
+                let beyond = |slot: &usize| row.weights[*slot..].iter().any(|w| *w != Vec3::ZERO);
+                level = level.max(slots.iter().take_while(|slot| beyond(slot)).count());
+                row.level = level;
+            }
+        }
     }
 
     /// log₂ of the pixels per mm of the first row.
@@ -122,20 +138,18 @@ impl Weights {
     }
 
     /// The weights as the shaders have them: of each profile the rows, of each row the slots, and in
-    /// the last component of its first one the highest level of all rows up to here.
+    /// the last component of its first one its level.
     pub fn table(&self) -> Vec<Vec4> {
         let mut table = Vec::new();
         for rows in &self.profiles {
-            let mut top = 0;
             for row in rows {
                 let levels = 0..=self.levels;
                 let beyond = |l: usize| row.weights[self.slot(l + 1, 0)..].iter().sum::<Vec3>();
                 let rest: Vec<Vec3> = levels.map(beyond).collect();
-                top = top.max(rest.iter().take_while(|r| **r != Vec3::ZERO).count());
                 let weights = row.weights.iter().chain(&rest).map(|w| w.extend(0.0));
                 let first = table.len();
                 table.extend(weights);
-                table[first].w = top as f32;
+                table[first].w = row.level as f32;
             }
         }
         table
@@ -169,6 +183,13 @@ impl Weights {
             sum += (blurred + halved) as f32 * f32::powi(0.25, l as i32);
         }
         sum
+    }
+
+    /// The row that tiles.wgsl asks for the level of a tile.
+    pub fn tile_row(&self, px_per_mm: f32) -> usize {
+        let rows = (px_per_mm.log2() - self.first_octave()) * ROWS_PER_OCTAVE as f32;
+        let row = rows.ceil() + ROWS_BEYOND;
+        row.clamp(0.0, (self.row_count() - 1) as f32) as usize
     }
 
     /// The largest error on straight edges, of any profile at any scale.
@@ -234,6 +255,7 @@ fn fit_columns(
         px_per_mm: px_per_mm as f32,
         predicted_error: worst(responses, &weights, wanted),
         weights,
+        level: 0, // known once all rows are
     }
 }
 

@@ -451,7 +451,7 @@ mod tests {
         let output = gpu.target("output", size, format);
         let mut effect = PlannedScreenSpace::new(&gpu.device, format).unwrap();
         let plan = Plan::new(&[Profile::SKIN], 0.01).unwrap();
-        let mut drawn_for = |id: u8| {
+        let mut drawn_for = |id: u8, px_per_mm: f32| {
             let frame = ScreenFrame {
                 irradiance: &light,
                 depth: &depth,
@@ -460,10 +460,10 @@ mod tests {
                 strength: None,
                 viewport: None,
                 output: &output,
-                // A facing plane, 4 pixels a millimetre.
+                // A facing plane.
                 projection: glam::Mat4::from_diagonal(glam::Vec4::new(
-                    8.0 / size[0] as f32,
-                    8.0 / size[1] as f32,
+                    2.0 * px_per_mm / size[0] as f32,
+                    2.0 * px_per_mm / size[1] as f32,
                     -0.001,
                     1.0,
                 )),
@@ -476,8 +476,21 @@ mod tests {
             gpu.run(|encoder| effect.render(encoder));
             drawn(&gpu, effect.pyramid())
         };
-        assert!(drawn_for(0).iter().all(|tiles| *tiles == [0, 0]));
+        assert!(drawn_for(0, 4.0).iter().all(|tiles| *tiles == [0, 0]));
         // Those at the border see what is beyond it.
-        assert_eq!(drawn_for(1)[0], [18 * 10, 20 * 12 - 18 * 10]);
+        assert_eq!(drawn_for(1, 4.0)[0], [18 * 10, 20 * 12 - 18 * 10]);
+        // The plan says up to which level. Below its first row and beyond its last one, too, and nowhere
+        // on a row, where rounding decides.
+        let rows = plan.rows(0);
+        let mut levels = Vec::new();
+        for octave in -7..=9 {
+            let px_per_mm = (octave as f32 + 0.03).exp2();
+            let row = plan.tile_row(px_per_mm).unwrap();
+            let drawn = drawn_for(1, px_per_mm);
+            let drawn = drawn.iter().take_while(|tiles| **tiles != [0, 0]).count();
+            assert_eq!(drawn, 1 + rows[row].level, "{px_per_mm} px/mm");
+            levels.push(rows[row].level);
+        }
+        assert_eq!([levels[0], levels[16]], [0, 7]);
     }
 }
