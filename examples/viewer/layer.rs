@@ -13,15 +13,18 @@ pub enum Layer {
     Exact,
     /// How wide the kernel is, in false colours.
     Width,
+    /// Up to which level of the pyramid the plan blurs, in false colours.
+    Level,
 }
 
 impl Layer {
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::None,
         Self::Texture,
         Self::Screen,
         Self::Exact,
         Self::Width,
+        Self::Level,
     ];
 
     pub fn title(self) -> &'static str {
@@ -31,7 +34,13 @@ impl Layer {
             Self::Screen => "screen space, planned",
             Self::Exact => "screen space, exact",
             Self::Width => "kernel width",
+            Self::Level => "level of the plan",
         }
+    }
+
+    /// Whether an effect draws it, pass by pass.
+    pub fn has_passes(self) -> bool {
+        matches!(self, Self::Texture | Self::Screen | Self::Exact)
     }
 }
 
@@ -44,13 +53,14 @@ pub enum Mode {
 
 impl Mode {
     /// In the order of their keys, from 1.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::One(Layer::None),
         Self::One(Layer::Texture),
         Self::One(Layer::Screen),
         Self::One(Layer::Exact),
         Self::Split,
         Self::One(Layer::Width),
+        Self::One(Layer::Level),
     ];
 
     pub fn title(self) -> &'static str {

@@ -6,6 +6,8 @@
 
 mod divider;
 mod layer;
+mod legend;
+mod level;
 #[allow(dead_code)] // The viewer takes two of its measures.
 #[path = "../shared/metrics.rs"]
 mod metrics;
@@ -14,6 +16,7 @@ mod orbit;
 #[path = "../shared/output.rs"]
 mod output;
 mod panel;
+mod passes;
 mod planner;
 mod shots;
 mod stage;

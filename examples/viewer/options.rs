@@ -22,9 +22,10 @@ Mouse, over the picture:
   wheel               zooms
 
 Keys:
-  1 to 6              no scattering, texture space, screen space by a plan, screen space exact,
-                      split, width of the kernel
+  1 to 7              no scattering, texture space, screen space by a plan, screen space exact,
+                      split, width of the kernel, level of the plan
   H                   half resolution
+  T                   takes the time of each pass of what is shown
   M                   measures the error against the exact effect
   R                   goes back to the first view and light
   S                   saves the picture, without the panel, as viewer-NNN.png

@@ -3,6 +3,8 @@
 use egui::{Button, ComboBox, Grid, RichText, ScrollArea, Slider, Ui};
 
 use crate::layer::{Layer, Mode};
+use crate::passes::Pass;
+use crate::stage::PassTimes;
 use crate::viewer::Viewer;
 
 /// In points.
@@ -90,11 +92,26 @@ fn times(ui: &mut Ui, viewer: &mut Viewer) {
                 }
                 ui.end_row();
             }
+            if let Some(ms) = frame.compose_ms {
+                ui.label("compose, read back");
+                ui.label(number(ms));
+                ui.end_row();
+            }
         });
         ui.small(format!(
-            "{width}×{height}; each from preparing to the end of submit and wait, of its last run. \
+            "{width}×{height}; effects from preparing to the end of submit and wait, of its last run. \
              A first run compiles, too; measuring runs it again."
         ));
+    }
+    let controls = &viewer.controls;
+    let layers = controls.mode.layers(controls.pair);
+    let has_passes = layers.into_iter().any(Layer::has_passes) && !viewer.is_waiting();
+    let time = ui.add_enabled(has_passes, Button::new("time the passes (T)"));
+    viewer.time_passes |= time.clicked();
+    if let Some(frame) = &viewer.frame {
+        for (layer, times) in &frame.passes {
+            passes(ui, *layer, times);
+        }
     }
     ui.add_space(4.0);
     ui.strong("relative RMSE against exact");
@@ -113,6 +130,26 @@ fn times(ui: &mut Ui, viewer: &mut Viewer) {
     );
     let measure = ui.add_enabled(!viewer.is_waiting(), Button::new("measure this view (M)"));
     viewer.measure |= measure.clicked();
+}
+
+/// Two passes to a line.
+fn passes(ui: &mut Ui, layer: Layer, times: &PassTimes) {
+    let sum: f64 = times.passes.iter().map(|pass| pass.ms).sum();
+    ui.label(format!("{}, by pass: {}", layer.title(), number(sum)));
+    let grid = Grid::new(layer).spacing([6.0, 2.0]);
+    grid.min_row_height(0.0).show(ui, |ui| {
+        for pair in times.passes.chunks(2) {
+            for Pass { name, ms } in pair {
+                ui.small(name);
+                ui.small(number(*ms));
+            }
+            ui.end_row();
+        }
+    });
+    ui.small(format!(
+        "Each submitted alone and waited for; with nothing to do that takes {}.",
+        number(times.empty_ms)
+    ));
 }
 
 fn plan(ui: &mut Ui, viewer: &Viewer) {

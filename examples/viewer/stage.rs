@@ -15,7 +15,9 @@ use subsurface::{
 };
 
 use crate::layer::Layer;
-use crate::{metrics, width};
+use crate::legend::Legend;
+use crate::passes::{Pass, Submission};
+use crate::{level, metrics, passes, width};
 
 /// While the view moves, effects that took longer wait until it rests.
 const PATIENCE_MS: f64 = 400.0;
@@ -42,6 +44,8 @@ pub struct Request {
     pub look: Look,
     /// Errors against the exact effect, too.
     pub measure: bool,
+    /// The time of each pass of what is shown, too.
+    pub time_passes: bool,
 }
 
 /// One layer, drawn.
@@ -49,8 +53,8 @@ pub struct Picture {
     /// What is seen, in words; where it is not what was asked for, why.
     pub title: String,
     pub image: RgbImage,
-    /// Pixels at the ends of the colours, where they are widths.
-    pub range: Option<[f32; 2]>,
+    /// Of false colours.
+    pub legend: Option<Legend>,
 }
 
 /// What an effect took.
@@ -63,6 +67,14 @@ pub struct Time {
     pub is_first: bool,
 }
 
+/// What the passes of an effect took.
+#[derive(Clone, Debug)]
+pub struct PassTimes {
+    pub passes: Vec<Pass>,
+    /// How much of each is the submission itself.
+    pub empty_ms: f64,
+}
+
 /// The answer to a request.
 pub struct Frame {
     /// That of its request.
@@ -71,8 +83,12 @@ pub struct Frame {
     pub pictures: Vec<Arc<Picture>>,
     /// Drawing and lighting, wall clock.
     pub draw_ms: f64,
+    /// Making a picture of scattered light and reading it back, wall clock.
+    pub compose_ms: Option<f64>,
     /// Of the effects that this view has been scattered by.
     pub times: Vec<Time>,
+    /// Of those whose passes were timed for this view.
+    pub passes: Vec<(Layer, PassTimes)>,
     /// Relative RMSE against the exact effect, where it was measured for this view.
     pub errors: Vec<(Layer, Option<f64>)>,
 }
@@ -93,8 +109,11 @@ impl Stage {
         let mut effects = Effects::default();
         while let Ok(mut request) = requests.recv() {
             while let Ok(newer) = requests.try_recv() {
-                let measure = request.measure || newer.measure;
-                request = Request { measure, ..newer };
+                request = Request {
+                    measure: request.measure || newer.measure,
+                    time_passes: request.time_passes || newer.time_passes,
+                    ..newer
+                };
             }
             answer(self.frame(&mut set, &mut effects, request));
         }
@@ -120,13 +139,21 @@ impl Stage {
         if request.measure {
             set.measure(self, effects, &request.look)?;
         }
+        if request.time_passes {
+            set.time_passes(self, effects, &request.look)?;
+        }
         let shots = &set.view.shots;
         let frame = Frame {
             pictures,
             draw_ms: set.view.draw_ms,
+            compose_ms: set.view.compose_ms,
             times: Layer::ALL
                 .iter()
                 .filter_map(|layer| shots.get(layer)?.time)
+                .collect(),
+            passes: Layer::ALL
+                .iter()
+                .filter_map(|layer| Some((*layer, shots.get(layer)?.passes.clone()?)))
                 .collect(),
             errors: set.view.errors.clone(),
             number: request.number,
@@ -164,6 +191,7 @@ struct View {
     profile: Profile,
     plan: Option<Arc<Plan>>,
     draw_ms: f64,
+    compose_ms: Option<f64>,
     shots: HashMap<Layer, Shot>,
     errors: Vec<(Layer, Option<f64>)>,
 }
@@ -174,6 +202,15 @@ struct Shot {
     /// Scattered, or as it fell; none behind false colours.
     irradiance: Option<TextureView>,
     time: Option<Time>,
+    passes: Option<PassTimes>,
+}
+
+/// What an effect leaves.
+struct Scattered {
+    title: String,
+    irradiance: TextureView,
+    /// None where nothing was to be done.
+    taken_ms: Option<f64>,
 }
 
 impl View {
@@ -187,6 +224,7 @@ impl View {
             profile: look.profile,
             plan: look.plan.clone(),
             draw_ms: ms(since),
+            compose_ms: None,
             shots: HashMap::new(),
             errors: Vec::new(),
         })
@@ -213,13 +251,14 @@ impl Set {
         }
         if view.profile != look.profile {
             // The plan brings its own.
-            let stays = |layer: &Layer| matches!(layer, Layer::None | Layer::Screen);
+            let stays = |l: &Layer| matches!(l, Layer::None | Layer::Screen | Layer::Level);
             view.shots.retain(|layer, _| stays(layer));
             view.errors.clear();
             view.profile = look.profile;
         }
         if view.plan != look.plan {
-            view.shots.remove(&Layer::Screen);
+            let goes = |l: &Layer| matches!(l, Layer::Screen | Layer::Level);
+            view.shots.retain(|layer, _| !goes(layer));
             view.errors.clear();
             view.plan = look.plan.clone();
         }
@@ -236,8 +275,12 @@ impl Set {
     ) -> Result<Arc<Picture>, Error> {
         let last_ms = effects.last_ms.get(&layer).copied().unwrap_or(0.0);
         let is_known = self.view.shots.contains_key(&layer);
-        let why = if layer == Layer::Screen && look.plan.is_none() {
+        let is_planned = matches!(layer, Layer::Screen | Layer::Level);
+        let is_exact = look.plan.as_ref().is_some_and(|plan| plan.is_exact());
+        let why = if is_planned && look.plan.is_none() {
             "the plan is being fitted".to_owned()
+        } else if layer == Layer::Level && is_exact {
+            "the plan is the exact effect, which has no levels".to_owned()
         } else if look.is_moving && last_ms > PATIENCE_MS && !is_known {
             format!("{} follows at rest", layer.title())
         } else {
@@ -252,7 +295,7 @@ impl Set {
         Ok(Arc::new(Picture {
             title: format!("{} ({why})", plain.title),
             image: plain.image.clone(),
-            range: None,
+            legend: None,
         }))
     }
 
@@ -267,7 +310,7 @@ impl Set {
             return Ok(shot.clone());
         }
         let shot = match layer {
-            Layer::Width => self.false_colors(stage, look)?,
+            Layer::Width | Layer::Level => self.false_colors(stage, look, layer)?,
             _ => self.scatter(stage, effects, look, layer)?,
         };
         self.view.shots.insert(layer, shot.clone());
@@ -281,6 +324,66 @@ impl Set {
         look: &Look,
         layer: Layer,
     ) -> Result<Shot, Error> {
+        let at_once = &mut Submission::AtOnce;
+        let Scattered {
+            title,
+            irradiance,
+            taken_ms,
+        } = self.run_effect(stage, effects, look, layer, at_once)?;
+        let time = taken_ms.map(|ms| Time {
+            layer,
+            ms,
+            is_first: effects.last_ms.insert(layer, ms).is_none(),
+        });
+        let since = Instant::now();
+        let pixels = self
+            .renderer
+            .compose(&stage.gpu, &irradiance, Shown::Picture, 1.0);
+        self.view.compose_ms = Some(ms(since));
+        Ok(Shot {
+            picture: Arc::new(Picture {
+                title,
+                image: image(self.size, pixels)?,
+                legend: None,
+            }),
+            irradiance: Some(irradiance),
+            time,
+            passes: None,
+        })
+    }
+
+    /// Runs the effects that are shown once more, pass by pass.
+    fn time_passes(
+        &mut self,
+        stage: &Stage,
+        effects: &mut Effects,
+        look: &Look,
+    ) -> Result<(), Error> {
+        for layer in look.layers.iter().filter(|layer| layer.has_passes()) {
+            // None where it could not be had; and whoever was shown has compiled.
+            if !self.view.shots.contains_key(layer) {
+                continue;
+            }
+            let empty_ms = passes::empty_ms(&stage.gpu);
+            let mut by_pass = Submission::ByPass(Vec::new());
+            self.run_effect(stage, effects, look, *layer, &mut by_pass)?;
+            if let (Submission::ByPass(passes), Some(shot)) =
+                (by_pass, self.view.shots.get_mut(layer))
+            {
+                shot.passes = Some(PassTimes { passes, empty_ms });
+            }
+        }
+        Ok(())
+    }
+
+    fn run_effect(
+        &mut self,
+        stage: &Stage,
+        effects: &mut Effects,
+        look: &Look,
+        layer: Layer,
+        submission: &mut Submission,
+    ) -> Result<Scattered, Error> {
         let (gpu, renderer) = (&stage.gpu, &self.renderer);
         let fallen = &renderer.gbuffer.irradiance;
         let output = match layer {
@@ -306,7 +409,7 @@ impl Set {
         let format = output.texture().format();
         let mut title = layer.title().to_owned();
         let taken_ms = match layer {
-            Layer::None | Layer::Width => None,
+            Layer::None | Layer::Width | Layer::Level => None,
             Layer::Screen => match &look.plan {
                 None => None,
                 Some(plan) => {
@@ -323,7 +426,7 @@ impl Set {
                         PlannedScreenSpace::new(&gpu.device, format)
                     })?;
                     effect.prepare(&gpu.device, &gpu.queue, &frame, plan)?;
-                    gpu.run(|encoder| effect.render(encoder));
+                    submission.run(gpu, |encoder, after| effect.render_by_pass(encoder, after));
                     Some(ms(since))
                 }
             },
@@ -331,7 +434,7 @@ impl Set {
                 let since = Instant::now();
                 let effect = made(&mut effects.exact, || ScreenSpace::new(&gpu.device, format))?;
                 effect.prepare(&gpu.device, &frame)?;
-                gpu.run(|encoder| effect.render(encoder));
+                submission.run(gpu, |encoder, after| effect.render_by_pass(encoder, after));
                 Some(ms(since))
             }
             Layer::Texture => {
@@ -345,50 +448,51 @@ impl Set {
                 })?;
                 let scatter = |atlas: &Atlas| {
                     effect.prepare(&gpu.device, atlas)?;
-                    gpu.run(|encoder| effect.render(encoder));
+                    submission.run(gpu, |encoder, after| effect.render_by_pass(encoder, after));
                     Ok(())
                 };
                 atlas.render(gpu, renderer, &profiles, stage.mm_per_unit, output, scatter)?;
                 Some(ms(since))
             }
         };
-        let time = taken_ms.map(|ms| Time {
-            layer,
-            ms,
-            is_first: effects.last_ms.insert(layer, ms).is_none(),
-        });
-        let pixels = renderer.compose(gpu, output, Shown::Picture, 1.0);
+        Ok(Scattered {
+            title,
+            irradiance: output.clone(),
+            taken_ms,
+        })
+    }
+
+    fn false_colors(&self, stage: &Stage, look: &Look, layer: Layer) -> Result<Shot, Error> {
+        let depth = &self.renderer.gbuffer.depth;
+        let depth: Vec<f32> = bytemuck::pod_collect_to_vec(&stage.gpu.read_bytes(depth.texture()));
+        let skin = self.skin(stage);
+        let in_pixels = |length_mm| {
+            let (camera, unit) = (&look.camera, stage.mm_per_unit);
+            width::in_pixels(length_mm, &depth, &skin, camera, self.size, unit)
+        };
+        let mut title = layer.title().to_owned();
+        let (pixels, legend) = match (layer, &look.plan) {
+            (Layer::Level, Some(plan)) => {
+                title = format!("{title} at {:.4}", plan.max_error());
+                let rows = level::rows(plan, &in_pixels(1.0), self.size[0]);
+                let (pixels, keys) = level::picture(plan, &rows);
+                (pixels, Some(Legend::Levels(keys)))
+            }
+            _ => {
+                let widths = in_pixels(width::widest_mm(&look.profile));
+                let range = width::range(&widths);
+                (width::picture(&widths, range), range.map(Legend::Width))
+            }
+        };
         Ok(Shot {
             picture: Arc::new(Picture {
                 title,
                 image: image(self.size, pixels)?,
-                range: None,
-            }),
-            irradiance: Some(output.clone()),
-            time,
-        })
-    }
-
-    fn false_colors(&self, stage: &Stage, look: &Look) -> Result<Shot, Error> {
-        let depth = &self.renderer.gbuffer.depth;
-        let depth: Vec<f32> = bytemuck::pod_collect_to_vec(&stage.gpu.read_bytes(depth.texture()));
-        let widths = width::in_pixels(
-            width::widest_mm(&look.profile),
-            &depth,
-            &self.skin(stage),
-            &look.camera,
-            self.size,
-            stage.mm_per_unit,
-        );
-        let range = width::range(&widths);
-        Ok(Shot {
-            picture: Arc::new(Picture {
-                title: Layer::Width.title().to_owned(),
-                image: image(self.size, width::picture(&widths, range))?,
-                range,
+                legend,
             }),
             irradiance: None,
             time: None,
+            passes: None,
         })
     }
 

@@ -5,8 +5,8 @@ use std::sync::mpsc::Sender;
 use std::time::Duration;
 
 use egui::{
-    Align2, Color32, ColorImage, CursorIcon, FontId, Key, MouseWheelUnit, PointerButton, Pos2,
-    Rect, Response, Sense, Stroke, TextureHandle, Ui, Vec2,
+    Align2, Color32, ColorImage, CursorIcon, Key, MouseWheelUnit, PointerButton, Pos2, Rect,
+    Response, Sense, Stroke, TextureHandle, Ui, Vec2,
 };
 use image::RgbImage;
 use subsurface::renderer::Lighting;
@@ -16,7 +16,7 @@ use crate::layer::{Layer, Mode};
 use crate::orbit::{Orbit, turn_light};
 use crate::planner::{Planner, Wish};
 use crate::stage::{Frame, Look, Picture, Request};
-use crate::{divider, panel, shots, width};
+use crate::{divider, legend, panel, shots};
 
 /// On a software driver the window takes time from what it waits for.
 const SPINNER: Duration = Duration::from_millis(250);
@@ -46,6 +46,8 @@ pub struct Viewer {
     pub frame: Option<Frame>,
     /// Errors against the exact effect are asked for with the next request.
     pub measure: bool,
+    /// Times of passes are asked for with the next request.
+    pub time_passes: bool,
     error: Option<Error>,
     home: Controls,
     out: PathBuf,
@@ -85,6 +87,7 @@ impl Viewer {
             about,
             frame: None,
             measure: false,
+            time_passes: false,
             error: None,
             out,
             divider: 0.5,
@@ -178,7 +181,7 @@ impl Viewer {
             layers: self.controls.mode.layers(self.controls.pair),
             is_moving,
         };
-        if self.sent.as_ref() == Some(&look) && !self.measure {
+        if self.sent.as_ref() == Some(&look) && !self.measure && !self.time_passes {
             return Ok(());
         }
         self.number += 1;
@@ -188,6 +191,7 @@ impl Viewer {
             number: self.number,
             look,
             measure: std::mem::take(&mut self.measure),
+            time_passes: std::mem::take(&mut self.time_passes),
         };
         self.requests
             .send(request)
@@ -203,6 +207,7 @@ impl Viewer {
             Key::Num4,
             Key::Num5,
             Key::Num6,
+            Key::Num7,
         ];
         for (key, mode) in digits.into_iter().zip(Mode::ALL) {
             if pressed(key) {
@@ -211,6 +216,7 @@ impl Viewer {
         }
         self.controls.half_resolution ^= pressed(Key::H);
         self.measure |= pressed(Key::M);
+        self.time_passes |= pressed(Key::T);
         if pressed(Key::R) {
             self.reset();
         }
@@ -296,14 +302,7 @@ impl Viewer {
         let inner = rect.shrink(10.0);
         let pictures = self.frame.as_ref().map_or(&[][..], |f| &f.pictures);
         let wrap = inner.width() / pictures.len().max(1) as f32;
-        let label = |at: Pos2, anchor: Align2, text: &str| {
-            for (offset, color) in [(1.0, Color32::from_black_alpha(200)), (0.0, Color32::WHITE)] {
-                let font = FontId::proportional(14.0);
-                let text = painter.layout(text.to_owned(), font, color, wrap);
-                let corner = anchor.anchor_size(at + Vec2::splat(offset), text.size());
-                painter.galley(corner.min, text, color);
-            }
-        };
+        let label = |at, anchor, text: &str| legend::label(&painter, at, anchor, text, wrap);
         match (self.textures.as_slice(), pictures) {
             ([texture], [picture]) => {
                 image(texture, (rect, unit));
@@ -331,43 +330,17 @@ impl Viewer {
                 label(inner.left_top(), Align2::LEFT_TOP, &text);
             }
         }
-        let ranged = pictures.iter().find_map(|p| p.range);
-        if let (Some(range), Some(frame)) = (ranged, &self.frame) {
-            let sigma_mm = width::widest_mm(&frame.look.profile);
-            let scale = match self.controls.half_resolution {
-                true => ", of half resolution",
-                false => "",
-            };
-            let text = format!("σ of the widest Gaussian ({sigma_mm:.2} mm) in pixels{scale}");
-            let bar = Rect::from_min_size(
-                Pos2::new(inner.left(), inner.bottom() - 54.0),
-                Vec2::new(inner.width().min(260.0), 12.0),
-            );
-            label(
-                bar.left_top() - Vec2::new(0.0, 4.0),
-                Align2::LEFT_BOTTOM,
-                &text,
-            );
-            legend(&painter, bar);
-            for place in [0.0, 0.5, 1.0] {
-                let width = range[0] * (range[1] / range[0]).powf(place);
-                let at = Pos2::new(bar.left() + place * bar.width(), bar.bottom() + 2.0);
-                let anchor = [Align2::LEFT_TOP, Align2::CENTER_TOP, Align2::RIGHT_TOP];
-                label(at, anchor[(2.0 * place) as usize], &format!("{width:.2}"));
+        if let Some(frame) = &self.frame {
+            let right = (inner.right() - legend::WIDTH).max(inner.left());
+            for (picture, x) in pictures.iter().zip([inner.left(), right]) {
+                if let Some(legend) = &picture.legend {
+                    let half = self.controls.half_resolution;
+                    let corner = Pos2::new(x, inner.bottom());
+                    legend::show(&painter, corner, legend, &frame.look.profile, half);
+                }
             }
         }
         label(inner.left_bottom(), Align2::LEFT_BOTTOM, &self.saved);
-    }
-}
-
-/// The colours in a row.
-fn legend(painter: &egui::Painter, bar: Rect) {
-    let steps = 64;
-    for i in 0..steps {
-        let [left, right] = [i, i + 1].map(|i| bar.left() + bar.width() * i as f32 / steps as f32);
-        let [r, g, b] = width::color((i as f32 + 0.5) / steps as f32);
-        let rect = Rect::from_x_y_ranges(left..=right, bar.y_range());
-        painter.rect_filled(rect, 0.0, Color32::from_rgb(r, g, b));
     }
 }
 
@@ -397,6 +370,7 @@ fn scaled(scale: f32) -> Result<Profile, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::width;
 
     #[test]
     fn profiles_are_scaled_in_width() {

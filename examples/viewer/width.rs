@@ -4,7 +4,7 @@ use subsurface::Profile;
 use subsurface::renderer::Camera;
 
 /// Of what does not scatter.
-const NOT_SKIN: [u8; 3] = [28, 29, 32];
+pub const NOT_SKIN: [u8; 3] = [28, 29, 32];
 /// Viridis, at equal steps: its lightness grows evenly.
 const COLORS: [[f32; 3]; 6] = [
     [68.0, 1.0, 84.0],
