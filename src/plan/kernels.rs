@@ -148,6 +148,20 @@ pub(crate) struct Kernels {
     pub coarse: Kinds,
 }
 
+impl Kernels {
+    /// Of the light that stays, of each blur of the frame, then of each of level 1 and so on: its variance in
+    /// square pixels of the frame.
+    pub fn variances_px2(&self, levels: usize) -> Vec<f64> {
+        let mut variances = vec![0.0];
+        variances.extend(self.fine.blurs().map(|b| b.variance_px2));
+        for l in 1..=levels as i32 {
+            let blurs = self.coarse.blurs();
+            variances.extend(blurs.map(|b| b.variance_px2 * f64::powi(4.0, l)));
+        }
+        variances
+    }
+}
+
 /// From the cheapest to the most exact. Levels double, so variances of a level are those of the one
 /// before, four times; whatever lies between is mixed. Found by fitting skin with many sets, at all
 /// scales: of those with as many taps these keep the smallest error.

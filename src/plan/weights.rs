@@ -32,11 +32,7 @@ impl Weights {
     /// Those of these kernels whose error is the least; `None` where it is more than `max_error`.
     pub fn new(profiles: &[Profile], max_error: f32, kernels: Kernels) -> Option<Self> {
         let responses = Responses::new(&kernels, MAX_LEVELS);
-        let widest = |p: &Profile| {
-            let variances = p.gaussians().iter().map(|g| f64::from(g.variance_mm2));
-            variances.fold(0.0, f64::max).sqrt()
-        };
-        let widths = || profiles.iter().map(widest).filter(|w| *w > 0.0);
+        let widths = || profiles.iter().map(widest_mm).filter(|w| *w > 0.0);
         let (widest, narrowest) = (
             widths().fold(0.0, f64::max),
             widths().fold(f64::MAX, f64::min),
@@ -202,6 +198,19 @@ impl Weights {
 /// σ of the widest Gaussian, in pixels, below which a profile does nothing worth a row.
 const LEAST_PX: f64 = 0.0625;
 
+/// How many times wider than a profile's widest Gaussian a blur may be. Wider ones would make edges a
+/// little better by carrying a little light very far, across whatever lies between.
+const WIDER: f64 = 2.0;
+
+/// σ of the widest Gaussian.
+fn widest_mm(profile: &Profile) -> f64 {
+    let variances = profile
+        .gaussians()
+        .iter()
+        .map(|g| f64::from(g.variance_mm2));
+    variances.fold(0.0, f64::max).sqrt()
+}
+
 /// The weights at one scale, without the square of the frame where the error does not ask for it.
 fn fit_row(
     responses: &Responses,
@@ -211,10 +220,19 @@ fn fit_row(
     max_error: f32,
 ) -> Row {
     let wanted = responses.wanted(profile, px_per_mm);
-    let all: Vec<usize> = (0..responses.columns[0].len()).collect();
+    // Level 1 stays for profiles of hardly any width.
+    let widest_px2 = WIDER * WIDER * (widest_mm(profile) * px_per_mm).powi(2);
+    let is_near = |variance_px2: f64| variance_px2 <= widest_px2.max(4.0);
+    let all: Vec<usize> = kernels
+        .variances_px2(MAX_LEVELS)
+        .into_iter()
+        .enumerate()
+        .filter(|(_, v)| is_near(*v))
+        .map(|(i, _)| i)
+        .collect();
     if kernels.fine.square_px2.is_some() {
-        let mut without = all.clone();
-        without.remove(kernels.fine.len());
+        let square = kernels.fine.len();
+        let without: Vec<usize> = all.iter().copied().filter(|i| *i != square).collect();
         let row = fit_columns(responses, &without, &wanted, px_per_mm, max_error);
         // Between two rows the error is a little larger than at either.
         if row.predicted_error <= 0.9 * max_error {
