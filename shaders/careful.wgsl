@@ -145,7 +145,8 @@ fn coarser_at(pixel: vec2i) -> vec4f {
     if total.a < 1e-3 {
         return vec4f(0.0, 0.0, 0.0, -1.0);
     }
-    return vec4f(max(total.rgb, vec3f(0.0)) / total.a, 1.0);
+    // What goes on beyond two pixels may leave what light can be.
+    return vec4f(clamp(total.rgb / total.a, vec3f(0.0), vec3f(65504.0)), 1.0);
 }
 
 fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
