@@ -3,7 +3,6 @@
 
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec2, Vec4};
-use wgpu::util::DeviceExt;
 use wgpu::{
     BindGroup, BindGroupLayout, ColorTargetState, CommandEncoder, Device, RenderPipeline,
     TextureFormat, TextureView,
@@ -247,11 +246,30 @@ impl Scratch {
 
 /// A uniform buffer of its own for each frame, so that several may be recorded before a submit.
 pub(crate) fn uniform<T: Pod>(device: &Device, label: &str, contents: &T) -> wgpu::Buffer {
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+    let usage = wgpu::BufferUsages::UNIFORM;
+    filled(device, label, bytemuck::bytes_of(contents), usage)
+}
+
+/// A buffer that holds these bytes, as many as a multiple of four; on a device that is lost one of nothing,
+/// where wgpu's own helper panics.
+pub(crate) fn filled(
+    device: &Device,
+    label: &str,
+    contents: &[u8],
+    usage: wgpu::BufferUsages,
+) -> wgpu::Buffer {
+    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
-        contents: bytemuck::bytes_of(contents),
-        usage: wgpu::BufferUsages::UNIFORM,
-    })
+        size: contents.len() as u64,
+        usage,
+        mapped_at_creation: true,
+    });
+    // What was lost, the device has told the host.
+    if let Ok(mut bytes) = buffer.get_mapped_range_mut(..) {
+        bytes.slice(..).copy_from_slice(contents);
+    }
+    buffer.unmap();
+    buffer
 }
 
 /// A texture that passes hand to each other.

@@ -10,7 +10,7 @@ use wgpu::{
 };
 
 use crate::frame::{NormalSettings, Optics, Viewport};
-use crate::gaussian_sum::{begin, scratch_view};
+use crate::gaussian_sum::{begin, filled, scratch_view};
 use crate::plan::Weights;
 use crate::{Output, ScreenFrame};
 use passes::{Compute, Draw, LIGHT, Passes, Shaders};
@@ -270,12 +270,14 @@ fn over_tiles(
 }
 
 fn weights(device: &Device, plan: &Weights) -> Buffer {
-    use wgpu::util::DeviceExt;
-    device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some("subsurface weights"),
-        contents: bytemuck::cast_slice(&plan.table()),
-        usage: wgpu::BufferUsages::STORAGE,
-    })
+    let table = plan.table();
+    let contents = bytemuck::cast_slice(&table);
+    filled(
+        device,
+        "subsurface weights",
+        contents,
+        wgpu::BufferUsages::STORAGE,
+    )
 }
 
 impl Frame {
