@@ -4,6 +4,7 @@ mod files;
 mod hosts;
 mod numbers;
 mod screen;
+mod surface;
 mod texture;
 mod time;
 
@@ -39,9 +40,24 @@ pub fn worst(results: &Results, truth: &[(usize, DVec3)]) -> Vec<(&'static str, 
             .map(|(i, t)| (pixels[*i].as_dvec3() - t).abs())
             .flat_map(|d| d.to_array());
         // `max` would lose what is not a number.
-        differences.fold(0.0, |a: f64, b| if b <= a { a } else { b })
+        differences.fold(0.0, worse)
     };
     results.iter().map(|(name, r)| (*name, of(r))).collect()
+}
+
+/// The larger of two figures, or that which is no number.
+pub fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b <= a { a } else { b }
+}
+
+/// Each method's largest difference between two results of its own.
+pub fn apart(a: &Results, b: &Results, pixels: &[usize]) -> Vec<(&'static str, f64)> {
+    let pairs = a.iter().zip(b);
+    let figures = pairs.flat_map(|(a, (_, b))| {
+        let other: Vec<_> = pixels.iter().map(|i| (*i, b[*i].as_dvec3())).collect();
+        worst(&vec![a.clone()], &other)
+    });
+    figures.collect()
 }
 
 /// A rectangle of a frame: first column and row, columns and rows.
