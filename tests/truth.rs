@@ -7,7 +7,9 @@ use std::f64::consts::{PI, TAU};
 use common::*;
 use glam::{DMat3, DVec3, Vec3};
 use subsurface::Profile;
-use subsurface::truth::closed_form::{scattered_cosine, scattered_step, step};
+use subsurface::truth::closed_form::{
+    legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_spot, scattered_step, step,
+};
 use subsurface::truth::{Patch, Place, SurfaceIntegral, Triangles, surface_integral};
 
 /// What a truth may be off by.
@@ -495,4 +497,63 @@ fn the_visible_integral_is_the_surface_integral_over_what_is_seen() {
             lit,
         );
     }
+}
+
+#[test]
+fn waves_and_spots_are_what_a_sum_over_the_plane_makes_of_them() {
+    // Steps of .3 σ: an integral to 1e-10.
+    let sum = |light: &dyn Fn(f64, f64) -> f64, variance_mm2: f64| {
+        let h = 0.3 * variance_mm2.sqrt();
+        let places = || (-24..=24).map(|i| h * f64::from(i));
+        let weight = |x: f64, y: f64| (-(x * x + y * y) / (2.0 * variance_mm2)).exp();
+        let (mut mass, mut sum) = (0.0, 0.0);
+        for (x, y) in places().flat_map(|y| places().map(move |x| (x, y))) {
+            mass += weight(x, y);
+            sum += weight(x, y) * light(x, y);
+        }
+        sum / mass
+    };
+    let profile = Profile::SKIN;
+    let scattered = |light: &dyn Fn(f64, f64) -> f64| -> DVec3 {
+        let gaussians = profile.gaussians().iter();
+        gaussians
+            .map(|g| g.weight.as_dvec3() * sum(light, g.variance_mm2.into()))
+            .sum()
+    };
+    let wave = scattered(&|x, _| (0.9 * x).cos());
+    assert!((wave - passed_wave(0.9, &profile)).abs().max_element() < 1e-6);
+    let spot = scattered(&|x, y| (-((x + 1.5).powi(2) + y * y) / 2.0).exp());
+    let closed = scattered_spot(1.5, 1.0, &profile);
+    assert!(
+        (spot - closed).abs().max_element() < 1e-6,
+        "{spot} {closed}"
+    );
+}
+
+#[test]
+fn harmonics_are_what_a_sum_over_the_sphere_makes_of_them() {
+    // At a pole, where only the height x above the equator counts: chord² = 2ρ²(1 − x).
+    let (rho_mm, degree) = (10.0, 24);
+    let profile = Profile::SKIN;
+    let mean = |variance_mm2: f64| {
+        let (mut mass, mut sum) = (0.0, 0.0);
+        // Closer towards the pole.
+        for i in 0..20_000 {
+            let t = (f64::from(i) + 0.5) / 20_000.0;
+            let x = 1.0 - 2.0 * t * t;
+            let weight = t * (-rho_mm * rho_mm * (1.0 - x) / variance_mm2).exp();
+            mass += weight;
+            sum += weight * legendre(x).nth(degree).unwrap();
+        }
+        sum / mass
+    };
+    let gaussians = profile.gaussians().iter();
+    let summed: DVec3 = gaussians
+        .map(|g| g.weight.as_dvec3() * mean(g.variance_mm2.into()))
+        .sum();
+    let closed = passed_harmonics(rho_mm, degree + 1, &profile)[degree];
+    assert!(
+        (summed - closed).abs().max_element() < 1e-5,
+        "{summed} {closed}"
+    );
 }
