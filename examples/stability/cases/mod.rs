@@ -39,15 +39,19 @@ pub fn worst(results: &Results, truth: &[(usize, DVec3)]) -> Vec<(&'static str, 
             .iter()
             .map(|(i, t)| (pixels[*i].as_dvec3() - t).abs())
             .flat_map(|d| d.to_array());
-        // `max` would lose what is not a number.
-        differences.fold(0.0, worse)
+        largest(differences)
     };
     results.iter().map(|(name, r)| (*name, of(r))).collect()
 }
 
-/// The larger of two figures, or that which is no number.
-pub fn worse(a: f64, b: f64) -> f64 {
+/// As `max`, which would lose what is not a number.
+pub fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b <= a { a } else { b }
+}
+
+/// The largest number; not a number where one of them is none.
+pub fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
+    numbers.into_iter().fold(f64::NEG_INFINITY, larger)
 }
 
 /// Each method's largest difference between two results of its own.
