@@ -102,10 +102,11 @@ fn grid(half_mm: f64) -> impl Iterator<Item = DVec2> {
 /// The swing of a track, and its middle row as a picture.
 fn swing(track: &Track) -> Outcome {
     let [rows, columns] = GRID;
-    let middle = rows / 2 * columns;
+    // Few enough for a small picture.
+    let middle = rows / 2 * columns + 4;
     Outcome {
         figures: track.swing(),
-        shown: Some(track.show(middle..middle + columns)),
+        shown: Some(track.show(middle..middle + columns - 8)),
     }
 }
 
