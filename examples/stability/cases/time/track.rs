@@ -81,7 +81,7 @@ impl Track {
     /// A picture of `points`, side by side, a frame a row from the first on.
     pub fn show(&self, points: std::ops::Range<usize>) -> Shown {
         // No more rows than a small picture has room for.
-        let frames = || (0..self.frames.len()).step_by(self.frames.len().div_ceil(24));
+        let frames = || (0..self.frames.len()).step_by(self.frames.len().div_ceil(12));
         let places = || frames().flat_map(|f| points.clone().map(move |p| (f, p)));
         let result = |errors: &[Vec<DVec3>]| -> Vec<Vec3> {
             let result = |(f, p): (usize, usize)| (self.truth[f][p] + errors[f][p]).as_vec3();
