@@ -1,7 +1,7 @@
 //! What moves: every method held to the truth's own motion.
 //!
 //! Figures are of a method's *errors*, its result less the truth, so that nothing counts that the truth
-//! does, too.
+//! does, too. In the pictures a frame is a row: what swings shows as unrest down the columns.
 
 mod atlas;
 mod camera;

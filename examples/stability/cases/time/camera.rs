@@ -126,7 +126,7 @@ const WHY_SWING: &str = "1/255 is a step of eight bits, which an eye sees where 
 
 const FOLLOWED: &str = "Points of the surface are followed and read by Catmull-Rom; the figure is the most that \
                         the error at one of them swings, from peak to peak, against the closed form. Texture space scatters \
-                        once, and every frame fetches from its atlas, which has 2 texels a pixel.";
+                        once, and every frame fetches from its atlas, which has 2 texels a pixel. In the picture a frame is a row.";
 
 /// A plane under waves of all directions.
 fn pan_over_a_plane(tilt_degrees: f64, quick: bool) -> Case {
@@ -259,7 +259,7 @@ fn pan_past_a_layer(quick: bool) -> Case {
         what: "A dark half-plane 5 mm before a lit one, its edge at 27 degrees, 4 px/mm, under a camera that pans \
                by fractions of a pixel. Points of the lit one, .75 to 4.4 mm beside the edge, are followed and read \
                by Catmull-Rom; the figure is the most that the error at one of them swings, from peak to peak, against the visible \
-               integral of each frame, read likewise. In texture space layers lie apart and nothing moves: see the pan over a plane."
+               integral of each frame, read likewise. In the picture a frame is a row. In texture space layers lie apart and nothing moves: see the pan over a plane."
             .into(),
         passes: STEP,
         degrades: SEEN,

@@ -238,7 +238,7 @@ fn moving_edge(quick: bool) -> Vec<Case> {
     let case = |name: &str, what: &str, passes, degrades, why: &str, figures| Case {
         group: Group::Time,
         name: format!("shadow moves: {name}"),
-        what: format!("{scene} {what}"),
+        what: format!("{scene} {what} In the picture a frame is a row."),
         passes,
         degrades,
         why: why.into(),
