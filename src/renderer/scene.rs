@@ -22,6 +22,8 @@ use crate::Error;
 
 /// Most triangles a scene may have; small files can ask for any number by repeating a mesh.
 const MAX_TRIANGLES: usize = 1 << 23;
+/// Most vertices that may be read; a primitive reads all of its accessor, whatever it draws.
+const MAX_VERTICES: usize = 1 << 27;
 /// The glTF attribute that holds [`Vertex::mask`], less its underscore.
 const SKIN_MASK: &str = "SKIN_MASK";
 /// Materials that do not scatter, by how their names start.
@@ -175,10 +177,11 @@ fn read(bytes: &[u8], base: Option<&Path>, input: &str) -> Result<Scene, Error> 
         buffers,
         images: HashMap::new(),
         materials: HashMap::new(),
-        triangles: 0,
         scene: Scene::default(),
     };
-    for (node, world) in walk(&gltf.document).map_err(fail("nodes that form a tree"))? {
+    let nodes = walk(&gltf.document).map_err(fail("nodes that form a tree"))?;
+    check_size(&nodes).map_err(fail("less to read"))?;
+    for (node, world) in nodes {
         if let Some(mesh) = node.mesh() {
             for primitive in mesh.primitives() {
                 reader.add(&mesh, &primitive, world)?;
@@ -243,12 +246,41 @@ fn walk<'a>(document: &'a gltf::Document) -> Result<Vec<(gltf::Node<'a>, Mat4)>,
     Ok(found)
 }
 
+/// Checks how much there is to read, before any of it is.
+fn check_size(nodes: &[(gltf::Node, Mat4)]) -> Result<(), String> {
+    let (mut triangles, mut vertices) = (0usize, 0usize);
+    let meshes = nodes.iter().filter_map(|(node, _)| node.mesh());
+    for primitive in meshes.flat_map(|mesh| mesh.primitives().collect::<Vec<_>>()) {
+        let count = primitive.get(&Semantic::Positions).map_or(0, |a| a.count());
+        let corners = primitive.indices().map_or(count, |a| a.count());
+        let drawn = match primitive.mode() {
+            Mode::Triangles => corners / 3,
+            Mode::TriangleStrip | Mode::TriangleFan => corners,
+            _ => 0,
+        };
+        triangles = triangles.saturating_add(drawn);
+        vertices = vertices.saturating_add(count.max(corners));
+    }
+    if triangles > MAX_TRIANGLES {
+        return Err(format!("{triangles} triangles, more than {MAX_TRIANGLES}"));
+    }
+    if vertices > MAX_VERTICES {
+        return Err(format!(
+            "{vertices} vertices to read, more than {MAX_VERTICES}"
+        ));
+    }
+    Ok(())
+}
+
 /// The bytes of a data URI or of a file beside the glTF file.
 fn read_uri(uri: &str, base: Option<&Path>) -> Result<Vec<u8>, String> {
-    if uri.contains(':') {
+    if uri.starts_with("data:") {
         let source = gltf::buffer::Source::Uri(uri);
         let data = gltf::buffer::Data::from_source(source, base);
         return data.map(|data| data.0).map_err(|e| e.to_string());
+    }
+    if uri.contains(':') {
+        return Err(format!("the address {uri}"));
     }
     let base = base.ok_or_else(|| format!("a reference to the file {uri}"))?;
     // Decoded here because the gltf crate panics on escapes that are not UTF-8.
@@ -264,7 +296,12 @@ fn read_uri(uri: &str, base: Option<&Path>) -> Result<Vec<u8>, String> {
         }
     }
     let name = String::from_utf8(name).map_err(|e| format!("the file name {uri}, {e}"))?;
-    std::fs::read(base.join(name)).map_err(|e| format!("{uri}, {e}"))
+    let path = base.join(name);
+    // A device or a pipe may have no end.
+    match std::fs::metadata(&path) {
+        Ok(file) if !file.is_file() => Err(format!("{uri}, which is no file")),
+        _ => std::fs::read(&path).map_err(|e| format!("{uri}, {e}")),
+    }
 }
 
 /// What is wrong and what is needed.
@@ -279,7 +316,6 @@ struct Reader<'a> {
     images: HashMap<usize, usize>,
     /// From a glTF material and a profile to the scene's material.
     materials: HashMap<(Option<usize>, u8), usize>,
-    triangles: usize,
     scene: Scene,
 }
 
@@ -300,10 +336,10 @@ impl Reader<'_> {
         if triangles.is_empty() {
             return Ok(());
         }
-        self.triangles += triangles.len();
-        if self.triangles > MAX_TRIANGLES {
-            let got = format!("more than {MAX_TRIANGLES} triangles in the scene");
-            return Err(fail((got, "fewer")));
+        // Placed, they would be made up anew, as those are that a transform flattens.
+        let mut normals = attributes.normals.as_flattened().iter();
+        if !normals.all(|x| x.is_finite()) {
+            return Err(fail(("NaN or infinity".into(), "finite normals")));
         }
         let (mut vertices, mut indices) = attributes.place(&triangles, world);
         let mut numbers = bytemuck::cast_slice::<Vertex, f32>(&vertices).iter();
@@ -453,6 +489,16 @@ impl Reader<'_> {
         if let Some(&known) = self.materials.get(&key) {
             return Ok(known);
         }
+        let normal_scale = from.normal_texture().map_or(1.0, |t| t.scale());
+        // JSON holds no infinity, but numbers that are too large for a float.
+        if !normal_scale.is_finite() {
+            let input = format!("{name}, normalTexture scale");
+            return Err(Error::new(
+                input,
+                normal_scale.to_string(),
+                "a finite number",
+            ));
+        }
         let pbr = from.pbr_metallic_roughness();
         let base_color_texture = pbr.base_color_texture().map(|t| self.image(&t.texture()));
         let normal_texture = from.normal_texture().map(|t| self.image(&t.texture()));
@@ -461,7 +507,7 @@ impl Reader<'_> {
             base_color: pbr.base_color_factor().map(|c| c.clamp(0.0, 1.0)),
             base_color_texture: base_color_texture.transpose()?,
             normal_texture: normal_texture.transpose()?,
-            normal_scale: from.normal_texture().map_or(1.0, |t| t.scale()),
+            normal_scale,
             roughness: pbr.roughness_factor().clamp(0.0, 1.0),
             alpha_cutoff: match from.alpha_mode() {
                 AlphaMode::Opaque => 0.0,
