@@ -21,6 +21,9 @@ pub const METHODS: [&str; 9] = [
     "texture_cascade",
 ];
 
+/// Whose figure it is where a file is read, before any method runs.
+pub const INPUT: &str = "input";
+
 /// Those of this crate.
 pub const OURS: [&str; 3] = ["screen_exact", "screen_planned", "texture_separable"];
 
@@ -156,6 +159,7 @@ impl Judged {
     pub fn worse(&self) -> Vec<String> {
         let ours = OURS
             .iter()
+            .chain(&[INPUT])
             .filter_map(|m| self.figure(m).map(|figure| (m, figure)));
         ours.filter_map(|(method, figure)| {
             let known = self.case.known.iter().find(|k| k.method == *method);
@@ -177,7 +181,7 @@ impl Judged {
         let verdicts = |ours: bool| {
             let figures = self.outcome.figures.iter();
             figures
-                .filter(move |(m, _)| OURS.contains(m) == ours && *m != "none")
+                .filter(move |(m, _)| OURS.contains(m) == ours && !["none", INPUT].contains(m))
                 .map(|(_, f)| self.case.verdict(*f))
         };
         verdicts(true).all(|v| v == Verdict::Passes) && verdicts(false).any(|v| v == Verdict::Fails)

@@ -14,6 +14,8 @@ mod lab;
 #[path = "../shared/method.rs"]
 #[allow(dead_code)] // Nothing is timed here.
 mod method;
+#[path = "../../tests/common/model.rs"]
+mod model;
 mod options;
 #[path = "../shared/output.rs"]
 mod output;

@@ -6,7 +6,7 @@ use std::path::Path;
 use image::codecs::jpeg::JpegEncoder;
 use subsurface::Error;
 
-use crate::case::{Group, Judged, METHODS, Verdict, short};
+use crate::case::{Group, INPUT, Judged, METHODS, Verdict, short};
 use crate::output;
 use crate::strip::strip;
 use crate::svg::Rasteriser;
@@ -114,6 +114,7 @@ fn picture_name(judged: &Judged) -> String {
 fn rows_of(rows: &[&Judged]) -> String {
     let used: Vec<&str> = METHODS
         .into_iter()
+        .chain([INPUT])
         .filter(|m| rows.iter().any(|row| row.figure(m).is_some()))
         .collect();
     let mut text = format!("| | passes | {} |\n|---|---|", used.join(" | "));

@@ -1,6 +1,6 @@
 //! The table of cases against methods, on one page.
 
-use crate::case::{Group, Judged, METHODS, Verdict, short};
+use crate::case::{Group, INPUT, Judged, METHODS, Verdict, short};
 use crate::svg::{Stroke, Svg, Type};
 
 const ROW: f64 = 17.0;
@@ -54,12 +54,16 @@ pub fn table(judged: &[Judged], caption: &str) -> String {
                 &row.case.name,
                 Type::new("#333", 11.5),
             );
-            for (i, method) in METHODS.iter().enumerate() {
-                let Some(figure) = row.figure(method) else {
-                    continue;
-                };
+            // What is read before any method runs stands for all of them.
+            let input = row
+                .figure(INPUT)
+                .map(|figure| (INPUT, 0..METHODS.len(), figure));
+            let methods = METHODS.iter().enumerate().filter_map(|(i, method)| {
+                row.figure(method).map(|figure| (*method, i..i + 1, figure))
+            });
+            for (method, columns, figure) in methods.chain(input) {
                 let verdict = row.case.verdict(figure);
-                let (left, right) = (column(i) + 1.0, column(i) + COLUMN - 1.0);
+                let (left, right) = (column(columns.start) + 1.0, column(columns.end) - 1.0);
                 let middle = y + ROW / 2.0;
                 let line = Stroke::new(verdict.color(), ROW - 2.0);
                 svg.line(&[[left, middle], [right, middle]], line);
@@ -67,10 +71,10 @@ pub fn table(judged: &[Judged], caption: &str) -> String {
                     .case
                     .known
                     .iter()
-                    .any(|k| k.method == *method && k.by_nature);
+                    .any(|k| k.method == method && k.by_nature);
                 let text = format!("{}{}", short(figure), if known { " *" } else { "" });
                 let set = Type::new("#222", 11.0).anchored("middle");
-                svg.text([column(i) + COLUMN / 2.0, y + 12.5], &text, set);
+                svg.text([(left + right) / 2.0, y + 12.5], &text, set);
             }
             y += ROW;
         }
