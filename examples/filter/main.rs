@@ -6,6 +6,9 @@
 //! ```
 
 mod channels;
+#[cfg(test)]
+#[path = "../../tests/common/damage.rs"]
+mod damage;
 mod dump;
 #[cfg(test)]
 mod fixture;

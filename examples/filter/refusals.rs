@@ -3,8 +3,12 @@
 use std::fs;
 
 use exr::prelude::{Compression, Encoding};
-use serde_json::json;
+use proptest::collection::vec;
+use proptest::prelude::*;
+use serde_json::{Value, json};
+use subsurface::Error;
 
+use crate::damage::{Damage, Lie, config};
 use crate::dump::{Camera, Dump};
 use crate::fixture::{Plane, floats, run, write, write_as};
 
@@ -331,6 +335,62 @@ fn damages() -> usize {
     asked.and_then(|n| n.parse().ok()).unwrap_or(200)
 }
 
+/// Reads a dump; what is taken must be what the effects can take.
+fn check(plane: &Plane) -> Result<(), TestCaseError> {
+    let read = || -> Result<Dump, Error> { Dump::read(Camera::read(&plane.case.0)?, 1) };
+    match read() {
+        Err(Error { got, needs, .. }) => prop_assert!(!got.is_empty() && !needs.is_empty()),
+        Ok(dump) => {
+            let [width, height] = dump.camera.size;
+            let pixels = (width * height) as usize;
+            let finite = |values: &[[f32; 4]]| values.as_flattened().iter().all(|x| x.is_finite());
+            prop_assert_eq!(dump.irradiance.len(), pixels);
+            prop_assert_eq!(dump.depth.len(), pixels);
+            prop_assert_eq!(dump.profile_id.len(), pixels);
+            prop_assert!(dump.normal.is_none_or(|n| n.len() == pixels && finite(&n)));
+            prop_assert!(finite(&dump.irradiance));
+            prop_assert!(dump.depth.iter().all(|d| d.is_finite()));
+            prop_assert!(dump.profile_id.iter().all(|id| *id <= 1));
+            prop_assert!(dump.camera.mm_per_unit.is_finite() && dump.camera.mm_per_unit > 0.0);
+            prop_assert!(dump.camera.projection.is_finite() && dump.depth_error_mm.is_finite());
+        }
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(config(256))]
+
+    #[test]
+    fn a_description_that_lies_is_a_frame_or_an_error(
+        lies in vec(any::<Lie>(), 0..3),
+        damage in vec(any::<Damage>(), 0..3),
+    ) {
+        let plane = Plane::new("lies");
+        let path = plane.at("gbuffer.json");
+        let mut json: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        lies.iter().for_each(|lie| lie.tell(&mut json));
+        let mut bytes = json.to_string().into_bytes();
+        damage.iter().for_each(|damage| damage.apply(&mut bytes));
+        fs::write(&path, bytes).unwrap();
+        check(&plane)?;
+    }
+
+    #[test]
+    fn a_damaged_file_is_a_frame_or_an_error(
+        file in 0..4usize,
+        damage in vec(any::<Damage>(), 1..4),
+    ) {
+        let plane = Plane::new("damage");
+        let names = ["irradiance.exr", "depth.exr", "normal.exr", "profile_id.exr"];
+        let path = plane.at(names[file]);
+        let mut bytes = fs::read(&path).unwrap();
+        damage.iter().for_each(|damage| damage.apply(&mut bytes));
+        fs::write(&path, bytes).unwrap();
+        check(&plane)?;
+    }
+}
+
 /// Files that are cut off or damaged are refused, or read as something; never a panic.
 #[test]
 fn damaged_files_are_no_panic() {
@@ -375,8 +435,7 @@ fn damaged_files_are_no_panic() {
         }
         for bytes in damaged {
             fs::write(&path, bytes).unwrap();
-            let camera = Camera::read(&plane.case.0).unwrap();
-            let _ = Dump::read(camera, 1);
+            check(&plane).unwrap();
         }
     }
 }
