@@ -154,15 +154,14 @@ pub fn flaw_of_scene(scene: &Scene) -> Option<String> {
             return Some(format!("{m:?}"));
         }
     }
-    let flaws = scene.primitives.iter().find_map(|p| {
+    scene.primitives.iter().find_map(|p| {
         let flaw = if p.material >= scene.materials.len() {
             Some("no material".into())
         } else {
             flaw_of_primitive(p)
         };
         flaw.map(|f| format!("{}: {f}", p.name))
-    });
-    flaws
+    })
 }
 
 fn flaw_of_primitive(p: &Primitive) -> Option<String> {
