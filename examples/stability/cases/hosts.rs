@@ -7,7 +7,7 @@ use subsurface::renderer::Gpu;
 use subsurface::{Error, Profile};
 
 use super::surface::{Methods, Surface, Uploaded, methods, ours};
-use super::{worse, worst};
+use super::{larger, worst};
 use crate::case::{Case, Group, METHODS, Outcome};
 use crate::common::{View, sphere};
 use crate::lab::Lab;
@@ -49,7 +49,7 @@ struct Worst(Vec<(&'static str, f64)>);
 impl Worst {
     fn add(&mut self, method: &'static str, figure: f64) {
         match self.0.iter_mut().find(|(m, _)| *m == method) {
-            Some((_, worst)) => *worst = worse(*worst, figure),
+            Some((_, worst)) => *worst = larger(*worst, figure),
             None => self.0.push((method, figure)),
         }
     }
