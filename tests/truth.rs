@@ -8,7 +8,8 @@ use common::*;
 use glam::{DMat3, DVec3, Vec3};
 use subsurface::Profile;
 use subsurface::truth::closed_form::{
-    legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_spot, scattered_step, step,
+    legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_cosine_around, scattered_spot,
+    scattered_step, step,
 };
 use subsurface::truth::{Patch, Place, SurfaceIntegral, Triangles, surface_integral};
 
@@ -287,6 +288,15 @@ fn the_surface_integral_knows_a_cylinder() {
     assert_exact(
         "cylinder, normalised",
         &found.normalised,
+        phis.iter().map(|p| scattered(*p, true)),
+    );
+    let series = scattered_cosine_around(rho_mm, &Profile::SKIN);
+    assert_exact(
+        "cylinder, by its series",
+        &phis
+            .iter()
+            .map(|p| series(*p).as_vec3())
+            .collect::<Vec<_>>(),
         phis.iter().map(|p| scattered(*p, true)),
     );
 }

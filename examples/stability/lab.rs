@@ -36,7 +36,8 @@ pub struct Lab {
     /// Of the skin profile, at the default error.
     pub plan: Plan,
     screen: RefCell<Vec<Screen>>,
-    texture: RefCell<Vec<Texture>>,
+    /// Over one atlas at a time, [`scatter_atlas`](Self::scatter_atlas).
+    pub texture: RefCell<Vec<Texture>>,
     /// What the device complained of.
     complaints: Arc<Mutex<Vec<String>>>,
 }

@@ -2,8 +2,9 @@
 
 use glam::{DVec2, DVec3, UVec2, Vec3};
 use half::f16;
+use subsurface::renderer::Gpu;
 use subsurface::truth::{self, Patch, Pixel};
-use subsurface::wgpu::TextureFormat;
+use subsurface::wgpu::{TextureFormat, TextureView};
 use subsurface::{Atlas, Error, Profile};
 
 use crate::lab::{Lab, OUTPUT};
@@ -24,6 +25,13 @@ pub struct Unwrapped {
     positions: Vec<[f32; 4]>,
     /// The texels that show skin, for the truth.
     skin: Vec<Pixel>,
+}
+
+/// The same on the device.
+pub struct Uploaded {
+    irradiance: TextureView,
+    positions: TextureView,
+    pub output: TextureView,
 }
 
 impl Unwrapped {
@@ -74,18 +82,8 @@ impl Unwrapped {
         lab: &Lab,
         uvs: &[DVec2],
     ) -> Result<Vec<(&'static str, Vec<Vec3>)>, Error> {
-        let gpu = &lab.gpu;
-        let size = self.size;
-        let half = TextureFormat::Rgba16Float;
-        let full = TextureFormat::Rgba32Float;
-        let atlas = Atlas {
-            irradiance: &gpu.upload("irradiance", size, half, &self.irradiance),
-            positions: &gpu.upload("positions", size, full, &self.positions),
-            output: &gpu.target("scattered", size, OUTPUT),
-            mm_per_unit: 1.0,
-            profiles: &[Profile::SKIN],
-        };
-        let results = lab.scatter_atlas(&atlas)?.into_iter();
+        let uploaded = self.upload(&lab.gpu);
+        let results = lab.scatter_atlas(&uploaded.atlas())?.into_iter();
         Ok(results
             .map(|(name, texels)| {
                 (
@@ -94,6 +92,18 @@ impl Unwrapped {
                 )
             })
             .collect())
+    }
+
+    /// With an output of its own.
+    pub fn upload(&self, gpu: &Gpu) -> Uploaded {
+        let size = self.size;
+        let half = TextureFormat::Rgba16Float;
+        let full = TextureFormat::Rgba32Float;
+        Uploaded {
+            irradiance: gpu.upload("irradiance", size, half, &self.irradiance),
+            positions: gpu.upload("positions", size, full, &self.positions),
+            output: gpu.target("scattered", size, OUTPUT),
+        }
     }
 
     fn fetch(&self, texels: &[Vec3], uv: DVec2) -> Vec3 {
@@ -109,6 +119,19 @@ impl Unwrapped {
         };
         let row = |dy| texel(0, dy).lerp(texel(1, dy), share.x);
         row(0).lerp(row(1), share.y)
+    }
+}
+
+impl Uploaded {
+    /// In mm, of skin.
+    pub fn atlas(&self) -> Atlas<'_> {
+        Atlas {
+            irradiance: &self.irradiance,
+            positions: &self.positions,
+            output: &self.output,
+            mm_per_unit: 1.0,
+            profiles: &[Profile::SKIN],
+        }
     }
 }
 

@@ -100,3 +100,41 @@ pub fn scattered_cosine(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -> DVec3
         terms.map(|(s, p)| *s * p).sum()
     }
 }
+
+/// max(cos φ, 0) around an endless cylinder, scattered by a profile by chord distance, at an angle φ:
+/// a Gaussian of the chord scales the n-th Fourier coefficient by Iₙ(q)/I₀(q), q = ρ²/v.
+pub fn scattered_cosine_around(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -> DVec3 {
+    use std::f64::consts::{FRAC_1_PI, PI};
+    const TERMS: usize = 1500;
+    let coefficient = |n: usize| match n {
+        0 => FRAC_1_PI,
+        1 => 0.5,
+        _ if n % 2 == 1 => 0.0,
+        _ => {
+            let sign = if n % 4 == 0 { -1.0 } else { 1.0 };
+            sign * 2.0 / (PI * ((n * n) as f64 - 1.0))
+        }
+    };
+    let mut scattered = vec![DVec3::ZERO; TERMS];
+    for g in profile.gaussians() {
+        let q = rho_mm * rho_mm / f64::from(g.variance_mm2);
+        // The ratio Iₙ/Iₙ₋₁ by its continued fraction, from far above.
+        let mut ratios = vec![1.0; TERMS];
+        let mut ratio = 0.0;
+        for n in (1..TERMS + 20_000).rev() {
+            ratio = 1.0 / (2.0 * n as f64 / q + ratio);
+            if n < TERMS {
+                ratios[n] = ratio;
+            }
+        }
+        let mut factor = 1.0;
+        for (n, sum) in scattered.iter_mut().enumerate() {
+            factor *= ratios[n];
+            *sum += g.weight.as_dvec3() * factor * coefficient(n);
+        }
+    }
+    move |phi| {
+        let terms = scattered.iter().enumerate();
+        terms.map(|(n, s)| *s * (n as f64 * phi).cos()).sum()
+    }
+}
