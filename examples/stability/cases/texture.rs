@@ -52,7 +52,7 @@ fn flat_squares(quick: bool) -> Vec<Case> {
     let texel_mm = if quick { 0.19 } else { 0.12 };
     let diagonal = Square::new(27.0, 0.5, quick);
     let upright = Square::new(0.0, 0.5, quick);
-    let wide = Square::new(27.0, 1.0, quick);
+    let wide = Square::new(45.0, 1.0, quick);
     let even @ [u, v] = [DVec2::X, DVec2::Y].map(|axis| axis * texel_mm);
     let whole = |u: DVec2, v: DVec2| Layout::apart(1, vec![Island::whole([u, v])]);
     let halves = || {
@@ -96,7 +96,7 @@ fn flat_squares(quick: bool) -> Vec<Case> {
         ),
         case(
             "stretch 1:2",
-            "One island of texels of .4 by .2 mm, the edge at 27 degrees and soft by 1 mm.",
+            "One island of texels of .4 by .2 mm, the edge at 45 degrees and soft by 1 mm.",
             &LARGEST,
             vec![],
             flat::run(&wide, whole(0.4 * DVec2::X, 0.2 * DVec2::Y), worst),
