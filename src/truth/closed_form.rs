@@ -111,7 +111,7 @@ pub fn scattered_cosine_around(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -
         1 => 0.5,
         _ if n % 2 == 1 => 0.0,
         _ => {
-            let sign = if n % 4 == 0 { -1.0 } else { 1.0 };
+            let sign = if n.is_multiple_of(4) { -1.0 } else { 1.0 };
             sign * 2.0 / (PI * ((n * n) as f64 - 1.0))
         }
     };
