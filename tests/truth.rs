@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3, Vec3};
 use subsurface::Profile;
 use subsurface::truth::closed_form::{
     legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_cosine_around, scattered_spot,
-    scattered_step, step,
+    scattered_step, step, through_slab,
 };
 use subsurface::truth::{Patch, Place, SurfaceIntegral, Triangles, surface_integral};
 
@@ -290,15 +290,12 @@ fn the_surface_integral_knows_a_cylinder() {
         &found.normalised,
         phis.iter().map(|p| scattered(*p, true)),
     );
+    // The series against the sum over angles.
     let series = scattered_cosine_around(rho_mm, &Profile::SKIN);
-    assert_exact(
-        "cylinder, by its series",
-        &phis
-            .iter()
-            .map(|p| series(*p).as_vec3())
-            .collect::<Vec<_>>(),
-        phis.iter().map(|p| scattered(*p, true)),
-    );
+    for phi in &phis {
+        let error = (series(*phi) - scattered(*phi, true)).abs().max_element();
+        assert!(error < 1e-6, "{phi}: {error}");
+    }
 }
 
 #[test]
@@ -310,16 +307,11 @@ fn the_surface_integral_knows_layers_and_a_slab_lit_from_behind() {
         let xs: Vec<f64> = across_edge().into_iter().filter(|x| *x < -0.01).collect();
         let asked: Vec<_> = xs.iter().map(|x| DVec3::new(*x, 0.1, gap_mm)).collect();
         let found = mesh.integral(&asked, |p| if p.z > 0.5 * gap_mm { 0.0 } else { 1.0 });
-        let scattered = |x: f64, normalised: bool| -> DVec3 {
+        let normalised = |x: f64| -> DVec3 {
             let terms = Profile::SKIN.gaussians().iter().map(|g| {
                 let v = f64::from(g.variance_mm2);
                 let through = (-gap_mm * gap_mm / (2.0 * v)).exp();
-                let mass = if normalised {
-                    step(-x, v) + through
-                } else {
-                    1.0
-                };
-                g.weight.as_dvec3() * through / mass
+                g.weight.as_dvec3() * through / (step(-x, v) + through)
             });
             terms.sum()
         };
@@ -327,14 +319,10 @@ fn the_surface_integral_knows_layers_and_a_slab_lit_from_behind() {
         assert_exact(
             &what,
             &found.printed,
-            xs.iter().map(|x| scattered(*x, false)),
+            xs.iter().map(|_| through_slab(gap_mm, &Profile::SKIN)),
         );
         let what = format!("{what}, normalised");
-        assert_exact(
-            &what,
-            &found.normalised,
-            xs.iter().map(|x| scattered(*x, true)),
-        );
+        assert_exact(&what, &found.normalised, xs.iter().map(|x| normalised(*x)));
     }
 }
 

@@ -1,5 +1,7 @@
 //! Scattered light that is known on paper.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
 use crate::Profile;
@@ -104,7 +106,7 @@ pub fn scattered_cosine(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -> DVec3
 /// max(cos φ, 0) around an endless cylinder, scattered by a profile by chord distance, at an angle φ:
 /// a Gaussian of the chord scales the n-th Fourier coefficient by Iₙ(q)/I₀(q), q = ρ²/v.
 pub fn scattered_cosine_around(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -> DVec3 {
-    use std::f64::consts::{FRAC_1_PI, PI};
+    use std::f64::consts::FRAC_1_PI;
     const TERMS: usize = 1500;
     let coefficient = |n: usize| match n {
         0 => FRAC_1_PI,
@@ -137,4 +139,15 @@ pub fn scattered_cosine_around(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -
         let terms = scattered.iter().enumerate();
         terms.map(|(n, s)| *s * (n as f64 * phi).cos()).sum()
     }
+}
+
+/// What an endless slab passes that is lit by 1 from behind: Eq. 7 as printed, over its two faces.
+pub fn through_slab(thickness_mm: f64, profile: &Profile) -> DVec3 {
+    let gaussians = profile.gaussians().iter();
+    gaussians
+        .map(|g| {
+            let v = f64::from(g.variance_mm2);
+            g.weight.as_dvec3() * (-thickness_mm * thickness_mm / (2.0 * v)).exp()
+        })
+        .sum()
 }
