@@ -1,0 +1,163 @@
+//! What lies close in the picture and far apart in space.
+
+use glam::{DVec2, DVec3};
+
+use super::scene::{Form, Scene, Surface};
+use super::trial::{Trial, Truth, middle};
+use super::{FOUND, SEEN, known};
+use crate::case::{Case, Group, Known};
+use crate::common::View;
+
+/// What may cross 10 mm of air or more.
+const LEAK: f64 = 0.0005;
+
+const WHY_LEAK: &str = "What crosses 10 mm of air is under .0001 by the skin profile, so that .0005, a half \
+     float's step below white, is a leak.";
+
+const COARSE: &str = "A coarse pixel keeps one surface, and what it leaves out is missing nearby. Take ScreenSpace where layers lie \
+     close, or another profile for each head.";
+
+const FOLD: &str = "Two passes are not quite the full sum on a bent surface, and least where two rims meet; normals do not help \
+     (.016). Another profile for each head keeps them apart.";
+
+const ISLANDS: &str = "It sums along the surface, an island at a time, and Eq. 7 counts light that crosses air as well. Where \
+     layers lie apart nothing is lost by that; where they touch, take ScreenSpace.";
+
+pub fn cases(quick: bool) -> Vec<Case> {
+    let gaps = [1.0, 2.0, 5.0, 10.0, 20.0].map(|gap_mm| layers(gap_mm, quick));
+    gaps.into_iter().chain(heads(quick)).collect()
+}
+
+/// Two layers of skin: a dark one in front of a lit one, as a nose over a cheek.
+fn layers(gap_mm: f64, quick: bool) -> Case {
+    const PX_PER_MM: f64 = 6.0;
+    let is_far = gap_mm >= 10.0;
+    Case {
+        group: Group::Screen,
+        name: format!("layers {gap_mm} mm apart"),
+        what: "A dark half-plane before a lit plane, the edge at 27 degrees, 6 px/mm: the largest \
+               difference to the visible integral on either, in texture space to what both layers, \
+               hidden parts included, scatter by Eq. 7, through air as through skin."
+            .into(),
+        passes: if is_far { LEAK } else { FOUND },
+        degrades: SEEN,
+        why: if is_far {
+            WHY_LEAK.into()
+        } else {
+            "Layers that are near do exchange light by Eq. 7; .01 is what an eye may find in a gradient.".into()
+        },
+        known: leaks(gap_mm),
+        run: Box::new(move |lab| {
+            let view = View::orthographic([128; 2], PX_PER_MM);
+            let across = DVec2::from_angle(27f64.to_radians()).extend(0.0);
+            let form = || Form::facing(128.0 / PX_PER_MM);
+            let near = Surface {
+                light: Box::new(move |point, _| (point.dot(across) < 0.0).then_some(DVec3::ZERO)),
+                ..Surface::new(form(), |_, _| DVec3::ZERO)
+            };
+            let far = Surface::new(form(), |_, _| DVec3::ONE).moved(DVec3::Z * -gap_mm);
+            Trial {
+                scene: Scene(vec![near, far]),
+                view,
+                background: 0.0,
+                crop: middle(&view, [if quick { 48 } else { 96 }; 2]),
+                asked: &|_| true,
+                screen: Truth::Visible,
+                texture: Some(([96; 2], Truth::Whole)),
+            }
+            .run(lab)
+        }),
+    }
+}
+
+/// Two heads of one profile, one dark and one lit.
+fn heads(quick: bool) -> Vec<Case> {
+    let case = |name: &str, apart_mm: f64, behind_mm: f64, known: Vec<Known>| {
+        let side = if quick { 40 } else { 80 };
+        let touch = behind_mm == 0.0;
+        Case {
+            group: Group::Screen,
+            name: name.into(),
+            what: format!(
+                "A dark ball of 10 mm, and a lit one {apart_mm} mm to its right and {behind_mm} mm behind it, 4 px/mm: \
+                 the largest difference to the visible integral {}, a rim of a pixel left out.",
+                if touch {
+                    "around where they touch, in texture space to the integral over both whole"
+                } else {
+                    "where they meet in the picture, in texture space to the light on each, which is the same all over it"
+                }
+            ),
+            passes: if touch { FOUND } else { LEAK },
+            degrades: SEEN,
+            why: if touch {
+                "By Eq. 7 skin that touches exchanges light; .01 is what an eye may find in a gradient.".into()
+            } else {
+                WHY_LEAK.into()
+            },
+            known,
+            run: Box::new(move |lab| {
+                const RHO_MM: f64 = 10.0;
+                let view = View::orthographic([168, 96], 4.0);
+                let ball = |light: f64| {
+                    Surface::new(Form::Sphere { rho_mm: RHO_MM }, move |_, _| {
+                        DVec3::splat(light)
+                    })
+                };
+                let half = DVec3::X * apart_mm / 2.0;
+                let constant = |hit: &crate::common::Hit| hit.irradiance;
+                Trial {
+                    scene: Scene(vec![
+                        ball(0.0).moved(-half),
+                        ball(1.0).moved(half - DVec3::Z * behind_mm),
+                    ]),
+                    view,
+                    background: 0.0,
+                    crop: middle(&view, [side; 2]),
+                    asked: &|_| true,
+                    screen: Truth::Visible,
+                    texture: Some((
+                        [128; 2],
+                        if touch {
+                            Truth::Whole
+                        } else {
+                            Truth::Paper(&constant)
+                        },
+                    )),
+                }
+                .run(lab)
+            }),
+        }
+    };
+    vec![
+        case(
+            "a head before another",
+            12.0,
+            30.0,
+            vec![known("screen_planned", 0.0012, COARSE)],
+        ),
+        case("heads side by side, one farther away", 20.0, 30.0, vec![]),
+        case(
+            "heads that touch",
+            20.0,
+            0.0,
+            vec![
+                known("screen_exact", 0.017, FOLD),
+                known("screen_planned", 0.21, COARSE),
+                known("texture_separable", 0.3, ISLANDS),
+            ],
+        ),
+    ]
+}
+
+fn leaks(gap_mm: f64) -> Vec<Known> {
+    let [planned, texture] = match gap_mm as u32 {
+        1 => [Some(0.055), Some(0.35)],
+        2 => [Some(0.075), Some(0.22)],
+        5 => [None, Some(0.025)],
+        10 => [Some(0.0045), None],
+        _ => [Some(0.005), None],
+    };
+    let planned = planned.map(|at_most| known("screen_planned", at_most, COARSE));
+    let texture = texture.map(|at_most| known("texture_separable", at_most, ISLANDS));
+    planned.into_iter().chain(texture).collect()
+}
