@@ -112,7 +112,7 @@ fn heads(quick: bool) -> Vec<Case> {
                     ]),
                     view,
                     background: 0.0,
-                    crop: middle(&view, [side; 2]),
+                    crop: middle(&view, [side, side * 2 / 3]),
                     asked: &|_| true,
                     screen: Truth::Visible,
                     texture: Some((

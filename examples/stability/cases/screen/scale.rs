@@ -24,13 +24,13 @@ fn kernel(width_px: f64, quick: bool) -> Case {
     let px_per_mm = width_px / SIGMA_MM;
     let side = if quick { 128 } else { 256 };
     // Where the middle of the frame sees all that scatters to it, there is an answer on paper.
-    let is_cut = f64::from(side) / px_per_mm / 2.0 < REACH_MM + 8.0 / px_per_mm;
+    let is_cut = f64::from(side) / px_per_mm / 2.0 < REACH_MM + 12.0 / px_per_mm;
     Case {
         group: Group::Screen,
         name: format!("kernel of {width_px} px"),
         what: format!(
             "An edge of light at 27 degrees, soft by a pixel, on skin that faces the camera at {px_per_mm:.2} px/mm, \
-             where red has a σ of {width_px} px: the largest difference within 8 px of the middle to {}.",
+             where red has a σ of {width_px} px: the largest difference in the middle 24 by 12 pixels to {}.",
             if is_cut {
                 "the visible integral, since the frame cuts the kernel on all sides; in texture space, whose atlas is \
                  that frame, too"
@@ -69,7 +69,7 @@ fn kernel(width_px: f64, quick: bool) -> Case {
                 scene: flat(&view, px_per_mm, light),
                 view,
                 background: 0.0,
-                crop: middle(&view, [16; 2]),
+                crop: middle(&view, [24, 12]),
                 asked: &|_| true,
                 screen: held_to(),
                 texture: Some(([side; 2], held_to())),
@@ -106,7 +106,7 @@ fn small(name: &str, what: &str, px_per_mm: f64, light: fn(DVec3) -> f64) -> Cas
                 scene: flat(&view, px_per_mm, move |point, _| DVec3::splat(light(point))),
                 view,
                 background: 0.0,
-                crop: middle(&view, [48; 2]),
+                crop: middle(&view, [48, 24]),
                 asked: &|_| true,
                 screen: Truth::Visible,
                 texture: Some(([96; 2], Truth::Visible)),
