@@ -64,12 +64,7 @@ fn edge(is_whole: bool, quick: bool) -> Case {
     let known = if is_whole {
         not_seen(0.24)
     } else {
-        vec![known(
-            "screen_planned",
-            0.014,
-            "Its pyramid goes on beyond the frame as it ends, which is nearer to the truth where light does, too, but \
-             is not what is seen. Draw a frame that is 8 mm wider on all sides, or take ScreenSpace.",
-        )]
+        goes_on(0.014)
     };
     let run = Box::new(move |lab: &_| {
         let blur_mm2 = PX_PER_MM.powi(-2);
@@ -102,9 +97,16 @@ fn edge(is_whole: bool, quick: bool) -> Case {
     case("an edge at the border", what, is_whole, known, run)
 }
 
+/// What a plan makes of the border.
+fn goes_on(at_most: f64) -> Vec<Known> {
+    let why = "Its pyramid goes on beyond the frame as it ends, which is nearer to the truth where light does, too, but is not what \
+               is seen. Draw a frame that is 8 mm wider on all sides, or take ScreenSpace.";
+    vec![known("screen_planned", at_most, why)]
+}
+
 /// What no method in screen space is spared.
 fn not_seen(at_most: f64) -> Vec<Known> {
-    let why = "What lies outside of the frame lights what is inside, and nobody told. Draw a frame that is 8 mm wider on all \
+    let why = "What lies outside of the frame lights what is inside, and nothing tells. Draw a frame that is 8 mm wider on all \
                sides and cut it after scattering, or take TextureSpace.";
     ["screen_exact", "screen_planned"]
         .map(|method| by_nature(method, at_most, why))
@@ -113,7 +115,11 @@ fn not_seen(at_most: f64) -> Vec<Known> {
 
 /// A head of which the frame shows the darker half.
 fn half_a_head(is_whole: bool, quick: bool) -> Case {
-    let known = if is_whole { not_seen(0.065) } else { vec![] };
+    let known = if is_whole {
+        not_seen(0.065)
+    } else {
+        goes_on(0.015)
+    };
     let run = Box::new(move |lab: &_| {
         const RHO_MM: f64 = 10.0;
         let light = from_camera(60.0, DVec3::X);

@@ -155,7 +155,7 @@ fn leaks(gap_mm: f64) -> Vec<Known> {
         2 => [Some(0.075), Some(0.22)],
         5 => [None, Some(0.025)],
         10 => [Some(0.0045), None],
-        _ => [Some(0.005), None],
+        _ => [Some(0.0085), None],
     };
     let planned = planned.map(|at_most| known("screen_planned", at_most, COARSE));
     let texture = texture.map(|at_most| known("texture_separable", at_most, ISLANDS));
