@@ -14,9 +14,9 @@ use crate::common::{Hit, View};
 const SIDE: u32 = 128;
 const PX_PER_MM: f64 = 4.0;
 
-/// What lies within 8 mm of the right border, a part of its height or all of it.
+/// What lies within 8 mm of the right border, around its middle.
 fn band(quick: bool) -> Crop {
-    let height = if quick { 28 } else { SIDE };
+    let height = if quick { 20 } else { 96 };
     Crop {
         first: [SIDE - 32, (SIDE - height) / 2],
         size: [32, height],

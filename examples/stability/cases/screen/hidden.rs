@@ -98,7 +98,7 @@ fn cylinder(part: &'static str, rho_mm: f64, degrees: f64, texels: [u32; 2]) -> 
             let angle = hit.normal.dot(across).atan2(hit.normal.z);
             scattered(angle - degrees.to_radians())
         };
-        let width = (10.0 * rho_mm) as u32 + 8;
+        let width = (10.0 * rho_mm) as u32 + 24;
         Trial {
             scene: Scene(vec![Surface::new(
                 form,

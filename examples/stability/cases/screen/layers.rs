@@ -60,7 +60,7 @@ fn layers(gap_mm: f64, quick: bool) -> Case {
                 scene: Scene(vec![near, far]),
                 view,
                 background: 0.0,
-                crop: middle(&view, [if quick { 48 } else { 96 }; 2]),
+                crop: middle(&view, [if quick { 48 } else { 80 }; 2]),
                 asked: &|_| true,
                 screen: Truth::Visible,
                 texture: Some(([96; 2], Truth::Whole)),

@@ -58,7 +58,7 @@ fn case(
                 scene: Scene(vec![Surface::new(form, lambert(light))]),
                 view,
                 background,
-                crop: middle(&view, [2 * half, if quick { half / 2 } else { 2 * half }]),
+                crop: middle(&view, [2 * half, if quick { half / 2 } else { 3 * half / 2 }]),
                 asked: &|_| true,
                 screen: Truth::Visible,
                 texture: Some((texels, Truth::Paper(&paper))),
@@ -75,7 +75,8 @@ fn thin() -> Vec<Known> {
             "screen_exact",
             0.045,
             "The outer pixels stand for most of its area, and how much they do follows from their slope, a guess where it \
-             comes from the depth of neighbours. With normals handed in it is .0052 where it was .021 without. TextureSpace knows all of it.",
+             comes from the depth of neighbours. With normals handed in it is .0052 where it was .021 without. The truth, too, takes \
+             the slope at a pixel's middle for all of the pixel. TextureSpace knows all of it.",
         ),
         known(
             "screen_planned",
