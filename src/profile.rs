@@ -25,6 +25,9 @@ pub struct Profile {
     len: usize,
 }
 
+/// As in shaders/gaussian_sum.wgsl.
+const REACH_SIGMAS: f32 = 3.5;
+
 const NONE: Gaussian = gaussian(0.0, 0.0, 0.0, 0.0);
 
 const fn gaussian(variance_mm2: f32, red: f32, green: f32, blue: f32) -> Gaussian {
@@ -141,6 +144,13 @@ impl Profile {
         Self::new(&gaussians)
     }
 
+    /// How far, in mm, the effects carry light: 3.5 σ of the widest Gaussian. Skin that is nearer than this
+    /// to the border of a frame lacks light from beyond it.
+    pub fn reach_mm(&self) -> f32 {
+        let variances = self.gaussians().iter().map(|g| g.variance_mm2);
+        REACH_SIGMAS * variances.fold(0.0, f32::max).sqrt()
+    }
+
     /// The Gaussians; the weights of each colour sum to 1.
     pub fn gaussians(&self) -> &[Gaussian] {
         &self.gaussians[..self.len]
@@ -164,6 +174,13 @@ mod tests {
         // Three printed decimals, six terms.
         assert!((sum - Vec3::ONE).abs().max_element() < 1e-6, "{sum}");
         assert_eq!(Profile::new(Profile::SKIN.gaussians()), Ok(Profile::SKIN));
+    }
+
+    #[test]
+    fn skin_reaches_as_far_as_its_taps() {
+        assert!((Profile::SKIN.reach_mm() - 9.53).abs() < 0.01);
+        let taps = format!("const REACH_SIGMAS = {REACH_SIGMAS:?};");
+        assert!(include_str!("../shaders/gaussian_sum.wgsl").contains(&taps));
     }
 
     #[test]

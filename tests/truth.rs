@@ -8,8 +8,8 @@ use common::*;
 use glam::{DMat3, DVec3, Vec3};
 use subsurface::Profile;
 use subsurface::truth::closed_form::{
-    legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_cosine_around, scattered_spot,
-    scattered_step, step, through_slab,
+    legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_cosine_around,
+    scattered_spot, scattered_step, step, through_slab,
 };
 use subsurface::truth::{Patch, Place, SurfaceIntegral, Triangles, surface_integral};
 

@@ -12,7 +12,7 @@ use super::kernels::Taps;
 use crate::Profile;
 
 /// Of the signals, in pixels; wide enough for the widest level.
-const LENGTH: usize = 8192;
+const LENGTH: usize = 16384;
 
 /// An edge that is passed through the pyramid: across which direction, soft by σ = 1 px or hard, and
 /// where the pixels that look at it lie.

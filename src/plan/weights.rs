@@ -14,8 +14,10 @@ pub(crate) const ROWS_PER_OCTAVE: f64 = 6.0;
 /// How many rows a tile looks beyond that of its scale, rounded up; as in tiles.wgsl.
 const ROWS_BEYOND: f32 = 2.0;
 
-/// Levels that weights may be for: at the last, a pixel is 128 of the frame's.
-const MAX_LEVELS: usize = 7;
+/// Levels that weights are fitted for: at the last, a pixel is 256 of the frame's.
+const FITTED_LEVELS: usize = 8;
+/// Levels that weights may be for.
+const MAX_LEVELS: usize = 10;
 
 /// The weights of the blurs of a pyramid.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,7 +33,7 @@ pub(crate) struct Weights {
 impl Weights {
     /// Those of these kernels whose error is the least; `None` where it is more than `max_error`.
     pub fn new(profiles: &[Profile], max_error: f32, kernels: Kernels) -> Option<Self> {
-        let responses = Responses::new(&kernels, MAX_LEVELS);
+        let responses = Responses::new(&kernels, FITTED_LEVELS);
         let widths = || profiles.iter().map(widest_mm).filter(|w| *w > 0.0);
         let (widest, narrowest) = (
             widths().fold(0.0, f64::max),
@@ -40,7 +42,7 @@ impl Weights {
         // From where the widest Gaussian of all is far below a pixel, to where the last level is as wide
         // as that of any profile.
         let (first, last) = if widest > 0.0 {
-            let last = f64::from(1 << MAX_LEVELS) / narrowest;
+            let last = f64::from(1 << FITTED_LEVELS) / narrowest;
             ((LEAST_PX / widest).log2(), last.log2())
         } else {
             (0.0, 0.0)
@@ -89,8 +91,44 @@ impl Weights {
             first_octave: first,
             profiles: fitted,
         };
+        weights.extend(max_error);
         weights.find_levels();
         (weights.predicted_error() <= max_error).then_some(weights)
+    }
+
+    /// Goes on beyond the scales that were fitted, to where the last level is used up: a profile of twice the
+    /// pixels takes of each level what it took of the one before. What it took of the frame's blurs goes to
+    /// the first level's narrowest; edges differ by half of that at most. Stops where some profile would
+    /// then be off by more than `max_error`.
+    fn extend(&mut self, max_error: f32) {
+        let (first, per_level) = (self.slot(1, 0), self.kernels.coarse.len());
+        for row in self.profiles.iter_mut().flatten() {
+            row.weights
+                .resize(first + MAX_LEVELS * per_level, Vec3::ZERO);
+        }
+        let octave = ROWS_PER_OCTAVE as usize;
+        if self.row_count() < octave {
+            return;
+        }
+        let doubled = |rows: &Vec<Row>| {
+            let mut row = rows[rows.len() - octave].clone();
+            let of_frame: Vec3 = row.weights[1..first].iter().sum();
+            row.weights[1..first].fill(Vec3::ZERO);
+            row.weights[first..].rotate_right(per_level);
+            row.weights[first] += of_frame;
+            row.predicted_error += 0.5 * of_frame.max_element();
+            row.px_per_mm *= 2.0;
+            row
+        };
+        for _ in 0..(MAX_LEVELS - FITTED_LEVELS) * octave {
+            let next: Vec<Row> = self.profiles.iter().map(doubled).collect();
+            if next.iter().any(|row| row.predicted_error > max_error) {
+                return;
+            }
+            for (rows, row) in self.profiles.iter_mut().zip(next) {
+                rows.push(row);
+            }
+        }
     }
 
     fn find_levels(&mut self) {
@@ -224,7 +262,7 @@ fn fit_row(
     let widest_px2 = WIDER * WIDER * (widest_mm(profile) * px_per_mm).powi(2);
     let is_near = |variance_px2: f64| variance_px2 <= widest_px2.max(4.0);
     let all: Vec<usize> = kernels
-        .variances_px2(MAX_LEVELS)
+        .variances_px2(FITTED_LEVELS)
         .into_iter()
         .enumerate()
         .filter(|(_, v)| is_near(*v))
@@ -269,9 +307,12 @@ fn fit_columns(
         weights[pair[1]] -= moved;
         weights[pair[0]] += moved;
     }
+    let mut unscattered = vec![Vec3::ZERO; weights.len()];
+    unscattered[0] = Vec3::ONE;
     Row {
         px_per_mm: px_per_mm as f32,
         predicted_error: worst(responses, &weights, wanted),
+        unscattered_error: worst(responses, &unscattered, wanted),
         weights,
         level: 0, // known once all rows are
     }
