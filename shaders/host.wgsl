@@ -8,11 +8,11 @@ fn is_finite(light: vec3f) -> bool {
 
 // Normals of a host.
 struct Normals {
-    to_view: mat3x3f,
+    // 0: there are none. First, as in View of surface.wgsl.
+    has: u32,
     // x·n + y has -1 to 1.
     decode: vec2f,
-    // 0: there are none.
-    has: u32,
+    to_view: mat3x3f,
 }
 
 // How z grows with a step of a pixel along a row and along a column, by the normal: 0 = n·∂p, where a

@@ -4,6 +4,13 @@
 //        with human skin".
 
 struct View {
+    // 0: all of the surface is of the first profile. First since shaders branch on it: lavapipe of Mesa
+    // 22.3 then compiles the first word of a buffer in, whichever that is, and where the shader gets
+    // longer by it does so at every draw, and keeps them all.
+    has_id: u32,
+    has_strength: u32,
+    // The depth at which there is no surface.
+    far: f32,
     // p.xy = (u + ∂u·at)·z + (v + ∂v·at) for the pixel at `at`: x and y of u and v, then of ∂u and ∂v.
     origin: vec4f,
     step: vec4f,
@@ -16,11 +23,6 @@ struct View {
     // Of the viewport, in the textures of the host.
     first_pixel: vec2u,
     size: vec2u,
-    // The depth at which there is no surface.
-    far: f32,
-    // 0: all of the surface is of the first profile.
-    has_id: u32,
-    has_strength: u32,
 }
 
 // A Gaussian, cut off by a shape of taps.

@@ -3,6 +3,9 @@
 
 // As in surface.wgsl.
 struct View {
+    has_id: u32,
+    has_strength: u32,
+    far: f32,
     origin: vec4f,
     step: vec4f,
     depth_to_mm: vec4f,
@@ -12,9 +15,6 @@ struct View {
     profiles: u32,
     first_pixel: vec2u,
     size: vec2u,
-    far: f32,
-    has_id: u32,
-    has_strength: u32,
 }
 
 // Side of a tile in pixels of its level; taps reach as far.

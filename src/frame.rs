@@ -207,12 +207,12 @@ impl ScreenFrame<'_> {
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub(crate) struct NormalSettings {
-    /// Columns.
-    pub to_view: [Vec4; 3],
-    /// x·n + y has -1 to 1.
-    pub decode: Vec2,
     pub has: u32,
     pub pad: u32,
+    /// x·n + y has -1 to 1.
+    pub decode: Vec2,
+    /// Columns.
+    pub to_view: [Vec4; 3],
 }
 
 impl NormalSettings {
@@ -223,14 +223,14 @@ impl NormalSettings {
         let [x, y, z] = to_view.to_cols_array_2d();
         let unorm = input::is_unorm(texture.texture().format());
         Self {
-            to_view: [x, y, z].map(|[a, b, c]| Vec4::new(a, b, c, 0.0)),
+            has: 1,
+            pad: 0,
             decode: if unorm {
                 Vec2::new(2.0, -1.0)
             } else {
                 Vec2::new(1.0, 0.0)
             },
-            has: 1,
-            pad: 0,
+            to_view: [x, y, z].map(|[a, b, c]| Vec4::new(a, b, c, 0.0)),
         }
     }
 }

@@ -474,9 +474,9 @@ mod tests {
             SHADER,
             "Normals",
             NormalSettings {
-                to_view,
+                has,
                 decode,
-                has
+                to_view
             }
         );
         assert_layout!(

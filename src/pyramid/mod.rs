@@ -109,6 +109,10 @@ impl Pyramid {
         let plan = &planned.plan;
         let optics = &inputs.optics;
         let view = View {
+            has_id: u32::from(frame.profile_id.is_some()),
+            has_strength: u32::from(frame.strength.is_some()),
+            far: optics.far,
+            pad: 0,
             origin: optics.origin,
             step: optics.step,
             depth_to_mm: optics.depth_to_mm(),
@@ -118,10 +122,6 @@ impl Pyramid {
             profiles: plan.profiles.len() as u32,
             first_pixel: viewport.first(),
             size: size.into(),
-            far: optics.far,
-            has_id: u32::from(frame.profile_id.is_some()),
-            has_strength: u32::from(frame.strength.is_some()),
-            pad: 0,
         };
         queue.write_buffer(&scratch.view, 0, bytemuck::bytes_of(&view));
         let normals = NormalSettings::new(frame.normal);

@@ -16,6 +16,10 @@ pub(super) const TILE: u32 = 8;
 #[repr(C)]
 #[derive(Clone, Copy, Pod, Zeroable)]
 pub(super) struct View {
+    pub has_id: u32,
+    pub has_strength: u32,
+    pub far: f32,
+    pub pad: u32,
     pub origin: Vec4,
     pub step: Vec4,
     pub depth_to_mm: Vec4,
@@ -25,10 +29,6 @@ pub(super) struct View {
     pub profiles: u32,
     pub first_pixel: UVec2,
     pub size: UVec2,
-    pub far: f32,
-    pub has_id: u32,
-    pub has_strength: u32,
-    pub pad: u32,
 }
 
 /// `Blur` of surface.wgsl.
@@ -227,6 +227,9 @@ mod tests {
             BLURS[0],
             "View",
             View {
+                has_id,
+                has_strength,
+                far,
                 origin,
                 step,
                 depth_to_mm,
@@ -235,10 +238,7 @@ mod tests {
                 stride,
                 profiles,
                 first_pixel,
-                size,
-                far,
-                has_id,
-                has_strength
+                size
             }
         );
         assert_layout!(
