@@ -537,8 +537,9 @@ fn normals_say_what_depth_says() {
         println!(
             "planned: {planned}, red RMS to the visible integral by depth {depth:.5}, by normals {normal:.5}"
         );
+        // No worse than a half float's step below white, which plans store in.
         assert!(
-            normal <= 1.1 * depth,
+            normal <= depth + 0.0005,
             "{normal} by normals, {depth} by depth"
         );
     }
