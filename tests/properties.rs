@@ -183,9 +183,9 @@ proptest! {
         }
     }
 
-    /// Who accepts more never gets the exact effect where another gets less.
+    /// Who accepts more never gets the exact effect where who accepts less gets a plan.
     #[test]
-    fn looser_plans_are_no_dearer(profile in profiles(-2.0..1.0)) {
+    fn looser_plans_are_not_exact_where_stricter_ones_are_not(profile in profiles(-2.0..1.0)) {
         let [strict, loose] = [DEFAULT_MAX_ERROR, 4.0 * DEFAULT_MAX_ERROR]
             .map(|max_error| Plan::new(&[profile], max_error).expect("an error that can be asked for"));
         prop_assert!(strict.is_exact() || !loose.is_exact());
