@@ -1,6 +1,6 @@
 //! Scattered light that is known on paper.
 
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_1_PI, PI};
 
 use glam::DVec3;
 
@@ -82,7 +82,8 @@ pub fn passed_harmonics(rho_mm: f64, degrees: usize, profile: &Profile) -> Vec<D
     passed
 }
 
-/// max(cos θ, 0) on a sphere, scattered by a profile by chord distance: Eq. 7 in closed form.
+/// max(cos θ, 0) on a sphere, scattered by a profile by chord distance: Eq. 7 in closed form, divided by
+/// the kernel's mass.
 pub fn scattered_cosine(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -> DVec3 {
     const TERMS: usize = 1500;
     let mut p_at_0 = 1.0;
@@ -104,9 +105,8 @@ pub fn scattered_cosine(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -> DVec3
 }
 
 /// max(cos φ, 0) around an endless cylinder, scattered by a profile by chord distance, at an angle φ:
-/// a Gaussian of the chord scales the n-th Fourier coefficient by Iₙ(q)/I₀(q), q = ρ²/v.
+/// a Gaussian of the chord scales the n-th Fourier coefficient by Iₙ(q)/I₀(q), q = ρ²/v, divided by its mass.
 pub fn scattered_cosine_around(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -> DVec3 {
-    use std::f64::consts::FRAC_1_PI;
     const TERMS: usize = 1500;
     let coefficient = |n: usize| match n {
         0 => FRAC_1_PI,
@@ -141,7 +141,8 @@ pub fn scattered_cosine_around(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -
     }
 }
 
-/// What an endless slab passes that is lit by 1 from behind: Eq. 7 as printed, over its two faces.
+/// What an endless slab passes that is lit by 1 from behind: Eq. 7 as printed, over its two faces. Divided by
+/// the kernel's mass on both, as the others are, it would be less.
 pub fn through_slab(thickness_mm: f64, profile: &Profile) -> DVec3 {
     let gaussians = profile.gaussians().iter();
     gaussians
