@@ -155,12 +155,23 @@ impl Judged {
         figures.iter().find(|(m, _)| *m == method).map(|(_, f)| *f)
     }
 
-    /// Modes of ours that are worse than they are known to be.
+    /// What is known of those of ours that do not pass here: a few pass in the quick form alone.
+    pub fn shortcomings(&self) -> impl Iterator<Item = &Known> {
+        self.case.known.iter().filter(|known| {
+            let figure = self.figure(known.method);
+            figure.is_none_or(|f| self.case.verdict(f) != Verdict::Passes)
+        })
+    }
+
+    /// Modes of ours that are worse than they are known to be, or that are known and have no figure.
     pub fn worse(&self) -> Vec<String> {
         let ours = OURS
             .iter()
             .chain(&[INPUT])
             .filter_map(|m| self.figure(m).map(|figure| (m, figure)));
+        let missing = self.case.known.iter().map(|known| known.method);
+        let missing = missing.filter(|method| self.figure(method).is_none());
+        let missing = missing.map(|m| format!("{}: {m} has no figure", self.case.title()));
         ours.filter_map(|(method, figure)| {
             let known = self.case.known.iter().find(|k| k.method == *method);
             let at_most = known.map_or(self.case.passes, |k| k.at_most);
@@ -173,6 +184,7 @@ impl Judged {
                 )
             })
         })
+        .chain(missing)
         .collect()
     }
 
@@ -193,7 +205,7 @@ pub fn short(figure: f64) -> String {
     match figure.abs() {
         _ if !figure.is_finite() => format!("{figure}"),
         0.0 => "0".into(),
-        f if f >= 1e4 || f < 1e-4 => format!("{figure:.0e}"),
+        f if !(1e-4..1e4).contains(&f) => format!("{figure:.0e}"),
         f if f >= 10.0 => format!("{figure:.0}"),
         f => {
             let places = (1 - f.log10().floor() as i32).max(0) as usize;

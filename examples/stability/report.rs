@@ -6,7 +6,7 @@ use std::path::Path;
 use image::codecs::jpeg::JpegEncoder;
 use subsurface::Error;
 
-use crate::case::{Group, INPUT, Judged, METHODS, Verdict, short};
+use crate::case::{Case, Group, INPUT, Judged, METHODS, Verdict, short};
 use crate::output;
 use crate::strip::strip;
 use crate::svg::Rasteriser;
@@ -89,8 +89,9 @@ impl Report<'_> {
             let title = group.title();
             let _ = writeln!(page, "\n## {}{}\n", title[..1].to_uppercase(), &title[1..]);
             page += &rows_of(&rows);
-            for judged in rows {
-                page += &details(judged);
+            let mut told = Told::default();
+            for family in rows.chunk_by(|a, b| a.case.what == b.case.what) {
+                page += &told.details(family);
             }
         }
         page
@@ -99,7 +100,8 @@ impl Report<'_> {
 
 /// What a picture is worth: where verdicts differ, or ours do not pass.
 fn is_shown(judged: &Judged) -> bool {
-    judged.rivals_fail_alone() || !judged.case.known.is_empty()
+    judged.outcome.shown.is_some()
+        && (judged.rivals_fail_alone() || judged.shortcomings().next().is_some())
 }
 
 fn picture_name(judged: &Judged) -> String {
@@ -117,7 +119,10 @@ fn rows_of(rows: &[&Judged]) -> String {
         .chain([INPUT])
         .filter(|m| rows.iter().any(|row| row.figure(m).is_some()))
         .collect();
-    let mut text = format!("| | passes | {} |\n|---|---|", used.join(" | "));
+    let mut text = format!(
+        "| | passes | degraded | {} |\n|---|---|---|",
+        used.join(" | ")
+    );
     text += &"---|".repeat(used.len());
     text += "\n";
     for row in rows {
@@ -130,35 +135,70 @@ fn rows_of(rows: &[&Judged]) -> String {
             },
         });
         let cells = cells.collect::<Vec<_>>().join(" | ");
-        let passes = short(row.case.passes);
-        let _ = writeln!(text, "| {} | ≤ {passes} | {cells} |", row.case.name);
+        let Case { name, .. } = &row.case;
+        let [passes, degrades] = [row.case.passes, row.case.degrades].map(short);
+        let _ = writeln!(text, "| {name} | ≤ {passes} | ≤ {degrades} | {cells} |");
     }
     text
 }
 
-fn details(judged: &Judged) -> String {
-    let case = &judged.case;
-    let mut text = format!("\n**{}.** {}", case.name, case.what);
-    let _ = writeln!(
-        text,
-        " Passes at {}, degraded up to {}. {}",
-        short(case.passes),
-        short(case.degrades),
-        case.why
-    );
-    for known in &case.known {
-        let nature = if known.by_nature { ", by nature" } else { "" };
-        let _ = writeln!(text, "\n- `{}`{nature}: {}", known.method, known.why);
+/// What has been said of a group, so that it is said once.
+#[derive(Default)]
+struct Told {
+    bounds: Vec<[String; 3]>,
+    /// Why a mode does not pass, and of which cases that was said.
+    reasons: Vec<(String, String)>,
+}
+
+impl Told {
+    /// Cases that are described in the same words, together.
+    fn details(&mut self, family: &[&Judged]) -> String {
+        let names: Vec<&str> = family.iter().map(|j| j.case.name.as_str()).collect();
+        let names = names.join("; ");
+        let mut text = format!("\n**{names}.** {}", family[0].case.what);
+        for Judged { case, .. } in family {
+            let bounds = [short(case.passes), short(case.degrades), case.why.clone()];
+            if !self.bounds.contains(&bounds) {
+                let [passes, degrades, why] = &bounds;
+                let _ = write!(text, " Passes to {passes}, degraded to {degrades}: {why}");
+                self.bounds.push(bounds);
+            }
+        }
+        text += "\n";
+        let mut reasons: Vec<(&str, bool, Vec<&str>)> = Vec::new();
+        for known in family.iter().flat_map(|j| j.shortcomings()) {
+            let said = reasons
+                .iter_mut()
+                .find(|(why, nature, _)| *why == known.why && *nature == known.by_nature);
+            match said {
+                Some((.., methods)) if methods.contains(&known.method) => (),
+                Some((.., methods)) => methods.push(known.method),
+                None => reasons.push((&known.why, known.by_nature, vec![known.method])),
+            }
+        }
+        for (why, by_nature, methods) in reasons {
+            let methods = methods.join("`, `");
+            let nature = if by_nature { ", by nature" } else { "" };
+            let said = self.reasons.iter().find(|(reason, _)| reason == why);
+            let reason = match said {
+                Some((_, of)) => format!("as for *{of}*."),
+                None => why.to_owned(),
+            };
+            let _ = writeln!(text, "\n- `{methods}`{nature}: {reason}");
+            if said.is_none() {
+                self.reasons.push((why.to_owned(), names.clone()));
+            }
+        }
+        for judged in family.iter().filter(|j| is_shown(j)) {
+            let name = &judged.case.name;
+            if family.len() > 1 {
+                let _ = writeln!(text, "\n*{name}:*");
+            }
+            let picture = picture_name(judged);
+            let _ = writeln!(text, "\n![{name}: truth and methods](images/{picture})");
+        }
+        text
     }
-    if is_shown(judged) && judged.outcome.shown.is_some() {
-        let _ = writeln!(
-            text,
-            "\n![{}: truth and methods](images/{})",
-            case.name,
-            picture_name(judged)
-        );
-    }
-    text
 }
 
 const INTRODUCTION: &str = "\
@@ -173,5 +213,9 @@ Written by
 on ADAPTER. The quick form of it runs before every change, and fails where a mode of this crate is worse
 than this page says. Which mode and settings a scene needs, [choosing.md](choosing.md) draws from it.
 
-In the tables, figures in *italics* are degraded, in **bold** fail. Irradiance is linear, white is 1.
+In the tables, figures in *italics* are degraded, those in **bold** fail. Irradiance is linear, and white is 1.
+\"The visible integral\" is Eq. 7 over what the camera sees, \"the closed form\" is Eq. 7 solved on paper, both divided by
+the kernel's mass. Below each table, cases that differ in a number or two are described together; a reason, for a
+threshold or for a mode that does not pass, is given where a group first needs it. In pictures the upper row shows
+the truth and the methods, the lower row their errors, ten times as bright.
 ";

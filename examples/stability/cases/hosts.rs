@@ -7,7 +7,7 @@ use subsurface::renderer::Gpu;
 use subsurface::{Error, Profile};
 
 use super::surface::{Methods, Surface, Uploaded, methods, ours};
-use super::{larger, worst};
+use super::{STEP, larger, worst};
 use crate::case::{Case, Group, METHODS, Outcome};
 use crate::common::{View, sphere};
 use crate::lab::Lab;
@@ -70,9 +70,8 @@ fn new_methods(lab: &Lab, gpu: &Gpu) -> Result<Methods, Error> {
 
 /// Bit for bit: `passes` and the reason for it.
 const SAME: f64 = 0.0;
-const WHY_SAME: &str = "The same work on the same device gives the same bits; a difference is something left over from \
-                        another frame. Below 1/255 it is one step of 8 bits.";
-const ONE_STEP: f64 = 1.0 / 255.0;
+const WHY_SAME: &str = "The same work on the same device gives the same bits, so that any difference is left over from another \
+                        frame; one of up to 1/255 is no more than a step of eight bits.";
 
 /// Another size every frame.
 fn resized(quick: bool) -> Case {
@@ -85,7 +84,7 @@ fn resized(quick: bool) -> Case {
              to what a new effect makes of the same frame."
         ),
         passes: SAME,
-        degrades: ONE_STEP,
+        degrades: STEP,
         why: WHY_SAME.into(),
         known: vec![],
         run: Box::new(move |lab| {
@@ -121,11 +120,11 @@ fn switched(quick: bool) -> Case {
         group: Group::Hosts,
         name: "another method every frame".into(),
         what: format!(
-            "{rounds} rounds over all methods, in another order each, one frame of one size each, all into one texture \
-             which none of them clears: the largest difference to what a new effect makes of the frame alone."
+            "{rounds} rounds over all methods, each in another order, a frame of the same size for each method, all into one \
+             texture that none of them clears: the largest difference to what a new effect makes of the frame alone."
         ),
         passes: SAME,
-        degrades: ONE_STEP,
+        degrades: STEP,
         why: WHY_SAME.into(),
         known: vec![],
         run: Box::new(move |lab| {
@@ -140,7 +139,7 @@ fn switched(quick: bool) -> Case {
             let mut figures = Worst::default();
             for frame in 0..rounds * count {
                 // Steps that have no divisor in common with the count come by all of them.
-                let step = [1, 3, 5, 2][frame / count % 4];
+                let step = [1, 3, 5, 7][frame / count % 4];
                 let (name, method) = &mut kept[frame * step % count];
                 let scattered = shared.by(gpu, method)?;
                 figures.add(name, apart(&scattered, &alone[frame * step % count]));
@@ -155,11 +154,11 @@ fn interleaved() -> Case {
     Case {
         group: Group::Hosts,
         name: "two effects, one submission".into(),
-        what: "Two frames of other sizes, an effect of its own for each: both are prepared, then both recorded into one \
-               command buffer: the largest difference to what effects make of either alone."
+        what: "Two frames of different sizes, each with an effect of its own, both prepared and then both recorded into one \
+               command buffer: the largest difference to what an effect makes of either alone."
             .into(),
         passes: SAME,
-        degrades: ONE_STEP,
+        degrades: STEP,
         why: WHY_SAME.into(),
         known: vec![],
         run: Box::new(|lab| {
@@ -195,13 +194,13 @@ fn lost() -> Case {
     Case {
         group: Group::Hosts,
         name: "a lost device".into(),
-        what: "A device is destroyed, its effects prepare and record another frame all the same, and go; then a new \
-               device with new effects: the largest difference to what the first one made of the frame. A panic ends \
-               the run; what the lost device complains of does not count. Ours alone: what the rivals do about it is \
-               this harness's doing, not their method's."
+        what: "A device is destroyed; its effects prepare and record another frame all the same, and are dropped. The figure \
+               is the largest difference of what a new device with new effects makes of that frame to what the first \
+               one made of it. A panic ends the run; what the lost device complains of does not count. Rivals are left \
+               out, since how they take it is up to this harness."
             .into(),
         passes: SAME,
-        degrades: ONE_STEP,
+        degrades: STEP,
         why: WHY_SAME.into(),
         known: vec![],
         run: Box::new(|lab| {

@@ -10,7 +10,18 @@ mod time;
 
 use glam::{DVec3, Vec3};
 
-use crate::case::{Case, Shown};
+use crate::case::{Case, Outcome, Run, Shown};
+
+/// A step of eight bits, which an eye sees where it comes and goes.
+const STEP: f64 = 1.0 / 255.0;
+/// What an eye may find in a gradient.
+const FOUND: f64 = 0.01;
+/// What is seen at a glance.
+const SEEN: f64 = 0.03;
+
+/// What the skin profile reaches in mm: 3.5 σ of its widest Gaussian. Closer to the frame's border kernels
+/// are cut, and the closed forms do not hold.
+const REACH_MM: f64 = 9.6;
 
 /// All of them; `quick` makes frames smaller and sequences shorter.
 pub fn all(quick: bool) -> Vec<Case> {
@@ -62,6 +73,18 @@ pub fn apart(a: &Results, b: &Results, pixels: &[usize]) -> Vec<(&'static str, f
         worst(&vec![a.clone()], &other)
     });
     figures.collect()
+}
+
+/// Without a picture: for what would show the same as others do.
+pub fn unpictured(case: Case) -> Case {
+    let run = case.run;
+    let run: Run = Box::new(move |lab| {
+        Ok(Outcome {
+            shown: None,
+            ..run(lab)?
+        })
+    });
+    Case { run, ..case }
 }
 
 /// A rectangle of a frame: first column and row, columns and rows.

@@ -7,13 +7,9 @@ mod widths;
 
 use crate::case::Case;
 
-/// What flat skin under even light may gain or lose, as a share of it: two 8-bit steps in a thousand are
-/// never seen, and half floats, which results are stored in, take up to half of it.
+/// What flat skin under even light may gain or lose, as a share of it: half a step of eight bits near white,
+/// and four of the half floats that results are stored in.
 const EVEN: f64 = 0.002;
-/// A difference that may be seen.
-const SEEN: f64 = 0.01;
-/// One that is.
-const PLAIN: f64 = 0.03;
 
 pub fn cases(quick: bool) -> Vec<Case> {
     [

@@ -10,17 +10,8 @@ mod silhouettes;
 mod slopes;
 mod trial;
 
+use super::{FOUND, REACH_MM, SEEN, STEP};
 use crate::case::{Case, Known};
-
-/// A step of eight bits: finer than what a screen shows.
-const STEP: f64 = 1.0 / 255.0;
-/// What an eye may find in a gradient.
-const FOUND: f64 = 0.01;
-/// What is seen at a glance.
-const SEEN: f64 = 0.03;
-
-/// What the widest Gaussian of skin reaches.
-const REACH_MM: f64 = 9.6;
 
 pub fn cases(quick: bool) -> Vec<Case> {
     [

@@ -18,23 +18,23 @@ pub fn case(quick: bool) -> Case {
         group: Group::Hosts,
         name: format!("{frames} frames, what they leave"),
         what: format!(
-            "{frames} frames of 32x32 and 24x40 pixels, ten of the one, ten of the other: by how many KiB a frame what \
-             the process has in memory grows (Linux), or what the device's allocator has, whichever does more. Both \
-             halves of the frames are looked at, and the one that grows less counts: what is leaked is leaked in both, \
-             what a heap or a driver keeps for later, once. A third as many frames go before."
+            "{frames} frames, in turn ten of 32x32 and ten of 24x40 pixels: by how many KiB a frame the memory of the \
+             process grows (on Linux), or that of the device's allocator, whichever grows more. The half of the frames \
+             in which it grows less counts: a leak shows in both, what a heap or a driver keeps for later in one. A \
+             third as many frames go before, uncounted."
         ),
         passes: 0.25,
         degrades: 2.0,
-        why: "The numbers of a frame take 2 KiB; whoever keeps those of every frame degrades, whoever keeps textures, 8 \
-              KiB each here, fails. A quarter of a KiB is 53 MiB in an hour at 60 Hz."
+        why: "a quarter of a KiB a frame is 53 MiB in an hour at 60 Hz. A frame's settings take 2 KiB, so that a method \
+              which keeps those is degraded; one that keeps textures, of 8 KiB each here, fails."
             .into(),
         known: vec![Known {
             method: "screen_planned",
             at_most: 1300.0,
             by_nature: false,
-            why: "With Mesa's software driver the process grows by a MiB a frame from the pass that packs the frame on, \
-                  while the device's allocator does not grow. The cause has not been found, nor whether it is the \
-                  driver's; the exact effect does not do it."
+            why: "On Mesa's software driver the process grows by a MiB a frame, from the first pass on, which packs the \
+                  frame; the device's allocator does not grow. The cause is not known, nor whether it is in the driver. \
+                  `ScreenSpace` does not grow."
                 .into(),
         }],
         run: Box::new(move |lab| {

@@ -6,10 +6,10 @@ use glam::{DVec2, DVec3, Mat3};
 use subsurface::wgpu::TextureFormat;
 use subsurface::{Normals, Profile, ScreenFrame};
 
-use super::{EVEN, PLAIN, SEEN};
+use super::EVEN;
 use crate::case::{Case, Group, Known, OURS, Outcome};
 use crate::cases::surface::Surface;
-use crate::cases::{Crop, worst};
+use crate::cases::{Crop, FOUND, SEEN, unpictured, worst};
 use crate::common::{Hit, View, plane, tilted_normal};
 
 pub fn cases(quick: bool) -> Vec<Case> {
@@ -27,7 +27,11 @@ pub fn cases(quick: bool) -> Vec<Case> {
         ("across the view", BadNormal::Across),
         ("NaN", BadNormal::NotANumber),
     ];
-    let depths = depths.map(|(name, value)| depth(name, value, side));
+    let depths = depths.map(|(name, value)| match value {
+        // As of NaN, and as of 1.
+        f32::INFINITY | -1.0 => unpictured(depth(name, value, side)),
+        _ => depth(name, value, side),
+    });
     let normals = normals.map(|(name, bad)| normal(name, bad, side));
     depths.into_iter().chain(normals).collect()
 }
@@ -37,14 +41,14 @@ fn depth(name: &str, value: f32, side: u32) -> Case {
     Case {
         group: Group::Numbers,
         name: format!("depth of {name}"),
-        what: "Flat skin 300 mm away under light of 1, reversed infinite depth, 3 px/mm; a pixel and a whole row, \
-               black, have this depth. They are 290 mm away from the rest or nowhere: the largest difference on any \
-               pixel of skin to 1, and on these to their own black. An atlas has the positions that follow from the \
-               depth; texels infinitely far away are no skin, and not looked at."
+        what: "Flat skin 300 mm away under light of 1, with reversed infinite depth, 3 px/mm. One pixel and one row are black \
+               and have this depth, which puts them 290 mm or more from the rest, or nowhere: the largest difference to \
+               1 on other pixels, and to black on these. Positions in the atlas follow from the depth; texels infinitely \
+               far away hold no skin and do not count."
             .into(),
         passes: EVEN,
-        degrades: SEEN,
-        why: "Nothing crosses 290 mm; .2 % is what even light may be off by.".into(),
+        degrades: FOUND,
+        why: "nothing crosses 290 mm; .2 % is what even light may be off by.".into(),
         known: if value.is_nan() {
             vec![lost_position()]
         } else {
@@ -90,9 +94,9 @@ fn lost_position() -> Known {
         method: "texture_separable",
         at_most: f64::INFINITY,
         by_nature: false,
-        why: "Positions that are no number spread as far as the kernel reaches; a test of each would cost every tap. A \
-              rasteriser draws no triangle that has such a vertex: only atlases that a host writes by a shader of its \
-              own can hold one, and that should leave its texels without skin."
+        why: "A position that is NaN spreads as far as the kernel reaches; to test for it would cost every tap. A rasteriser \
+              does not draw a triangle with such a vertex. A host that writes positions by a shader of its own should \
+              leave such texels without skin."
             .into(),
     }
 }
@@ -131,12 +135,13 @@ fn normal(name: &str, bad: BadNormal, side: u32) -> Case {
     Case {
         group: Group::Numbers,
         name: format!("normals {name}"),
-        what: "A slope of 30 degrees under waves of light 4 mm long, 6 px/mm; such a normal in every second pixel, in \
-               the others its own: the largest difference to the visible integral. Rivals and atlases take no normals."
+        what: "A slope of 30 degrees under waves of light 4 mm long, 6 px/mm; every second pixel has such a \
+               normal, the others their own: the largest difference to the visible integral. Neither rivals nor atlases \
+               take normals."
             .into(),
-        passes: SEEN,
-        degrades: PLAIN,
-        why: "Depth says which way the surface faces, and a normal that cannot be is none; .01 is what an eye may find."
+        passes: FOUND,
+        degrades: SEEN,
+        why: "depth tells which way the surface faces, so that impossible normals can be ignored; .01 is what an eye may find."
             .into(),
         known: vec![],
         run: Box::new(move |lab| {

@@ -4,10 +4,10 @@ use glam::{DVec2, DVec3, Vec3};
 use half::f16;
 use subsurface::Error;
 
-use super::{EVEN, SEEN};
+use super::EVEN;
 use crate::case::{Case, Group, Known, Outcome};
 use crate::cases::surface::Surface;
-use crate::cases::{Crop, Results, apart, worst};
+use crate::cases::{Crop, FOUND, Results, apart, unpictured, worst};
 use crate::common::{View, plane, sphere};
 use crate::lab::Lab;
 
@@ -20,10 +20,13 @@ pub fn cases(quick: bool) -> Vec<Case> {
     ];
     let mut cases: Vec<Case> = [0.0, 1e-6, 1e4, 65504.0].map(|e| constant(e, side)).into();
     cases.push(saturated(side));
-    for (name, value) in bad {
-        cases.push(lost_pixels(name, value, side));
-        cases.push(change(name, value, side));
-    }
+    cases.extend(bad.map(|(name, value)| lost_pixels(name, value, side)));
+    // Infinity looks as NaN does.
+    let changes = bad.map(|(name, value)| match value {
+        f32::INFINITY | f32::NEG_INFINITY => unpictured(change(name, value, side)),
+        _ => change(name, value, side),
+    });
+    cases.extend(changes);
     cases.push(negative(side));
     cases
 }
@@ -34,25 +37,25 @@ fn constant(light: f32, side: u32) -> Case {
         0.0 => (
             0.0,
             f64::from(f16::MIN_POSITIVE_SUBNORMAL),
-            "Nothing comes of nothing; a step of a half float is what a host might never find.",
+            "nothing comes of nothing; 6e-8 is the smallest half float.",
         ),
         1e-6 => (
             0.06,
             0.5,
-            "So close to 0 a step of a half float is 6 %; who loses half of the light loses it in every pass.",
+            "so close to 0 a step of half floats is 6 %; half of the light is eight steps, one or more in every pass.",
         ),
         _ => (
             EVEN,
-            SEEN,
-            "Skin neither adds nor takes energy; .2 % is what flat skin may be off by, and four steps of the half \
-             floats that results are stored in.",
+            FOUND,
+            "even light stays as it is; .2 % is two to four steps of half floats, which results are stored in, .01 what \
+             an eye may find.",
         ),
     };
     Case {
         group: Group::Numbers,
-        name: format!("light of {light:?} throughout"),
+        name: format!("light of {light} throughout"),
         what: "A ball of 12 mm before a background of the same light, 3 px/mm: the largest difference to that light, \
-               as a share of it (where there is any)."
+               as a share of it unless it is 0."
             .into(),
         passes,
         degrades,
@@ -92,17 +95,17 @@ fn saturated(side: u32) -> Case {
         group: Group::Numbers,
         name: "65504 beside black".into(),
         what: "A hard edge at 27 degrees between the largest half float and no light: the largest difference to the \
-               same method's own result of light of 1, times 65504, as a share of 65504. Scattering is linear."
+               same method's result of light of 1, times 65504, as a share of 65504, since scattering is linear."
             .into(),
         passes: EVEN,
-        degrades: SEEN,
-        why: "Half floats round both alike, to a step of .0005 each; beyond .01 an eye may find it.".into(),
+        degrades: FOUND,
+        why: "half floats round both to .0005; .01 is what an eye may find.".into(),
         known: vec![Known {
             method: "screen_planned",
             at_most: 0.0025,
             by_nature: false,
-            why: "Along the frame's border light goes on as between the last two pixels, and is cut off where that is \
-                  more than half floats hold. It has no such border in texture space, nor the exact effect."
+            why: "Along the frame's border coarse levels are extrapolated from the last two pixels, and cut off where that \
+                  is more than half floats hold. `ScreenSpace` does not extrapolate."
                 .into(),
         }],
         run: Box::new(move |lab| {
@@ -147,14 +150,13 @@ fn lost_pixels(name: &str, value: f32, side: u32) -> Case {
     Case {
         group: Group::Numbers,
         name: format!("{name} in 4 pixels, pixels lost"),
-        what: format!(
-            "Flat skin under light of 1, {name} in four pixels far from each other: the number of pixels that are no \
-             finite number in the result."
-        ),
+        what: "Flat skin under light of 1, but for four pixels far from each other, which are NaN or infinite: how many pixels \
+               of the result are."
+            .into(),
         passes: 0.0,
         degrades: 4.0,
-        why: "One lost pixel becomes a patch in bloom and a whole black frame in the exposure. Four are those that the \
-              host lost itself; more, and scattering spread them."
+        why: "one lost pixel becomes a patch in bloom, and can turn the whole frame black by automatic exposure. Four were lost \
+              before; if there are more, scattering has spread them."
             .into(),
         known: vec![],
         run: Box::new(move |lab| {
@@ -173,12 +175,12 @@ fn change(name: &str, value: f32, side: u32) -> Case {
     Case {
         group: Group::Numbers,
         name: format!("{name} in 4 pixels, what changes"),
-        what: "The same frame: the largest difference to 1, which is the mean of all light that there is, on all of \
-               the skin. Such a pixel should give nothing, and take what is around it."
+        what: "The same frames: the largest difference to 1 on all of the skin. Such a pixel should give nothing, and take the \
+               light around it."
             .into(),
         passes: EVEN,
-        degrades: SEEN,
-        why: "All that is known of the light is the same; .2 % is what even light may be off by.".into(),
+        degrades: FOUND,
+        why: "all light that is known is 1; .2 % is what even light may be off by.".into(),
         known: vec![],
         run: Box::new(move |lab| {
             let surface = dotted(value, side);
@@ -201,13 +203,12 @@ fn negative(side: u32) -> Case {
     Case {
         group: Group::Numbers,
         name: "-1 in 4 pixels".into(),
-        what: "Flat skin under light of 1, -1 in four pixels, and again with 3 in them: the largest difference of the \
-               mean of both results to 1, which is what the integral gives. Light below 0 is not cut off: what it \
-               takes, it takes as far as light would have gone, and no further."
+        what: "Flat skin under light of 1, with -1 in four pixels, and again with 3 in them: the largest difference of the mean \
+               of both results to 1. Scattering is linear, so that light below 0 is not to be cut off."
             .into(),
         passes: EVEN,
-        degrades: SEEN,
-        why: "Steps of half floats are .002 at 3 and .0005 at 1; their mean is .0012.".into(),
+        degrades: FOUND,
+        why: "half floats have steps of .002 at 3 and of .0005 at 1, of which the mean is .0012.".into(),
         known: vec![],
         run: Box::new(move |lab: &Lab| -> Result<Outcome, Error> {
             let [below, above] = [-1.0, 3.0].map(|e| dotted(e, side));

@@ -7,10 +7,10 @@ use subsurface::Profile;
 use subsurface::renderer::Gpu;
 use subsurface::wgpu::{self, ErrorFilter, TextureView};
 
-use super::{EVEN, PLAIN, SEEN};
+use super::EVEN;
 use crate::case::{Case, Group, Known, Outcome};
 use crate::cases::surface::{Surface, methods};
-use crate::cases::worst;
+use crate::cases::{FOUND, SEEN, worst};
 use crate::common::{GBuffer, Hit, View};
 use crate::frame::Texels;
 use crate::lab::OUTPUT;
@@ -54,8 +54,8 @@ fn one_pixel() -> Case {
         name: "1x1".into(),
         what: "A frame of one pixel of skin: the difference to its own light, which is all that there is.".into(),
         passes: EVEN,
-        degrades: SEEN,
-        why: "As even light.".into(),
+        degrades: FOUND,
+        why: ".2 % is what even light may be off by.".into(),
         known: vec![],
         run: Box::new(|lab| {
             let g = waves([1, 1]);
@@ -77,15 +77,15 @@ fn strip(size: [u32; 2]) -> Case {
         what: "A frame a pixel wide, of flat skin under waves of light 4 mm long, 6 px/mm: the largest difference to \
                the visible integral, at both ends and in the middle."
             .into(),
-        passes: SEEN,
-        degrades: PLAIN,
+        passes: FOUND,
+        degrades: SEEN,
         why: ".01 is what an eye may find.".into(),
         known: vec![Known {
             method: "screen_planned",
             at_most: 0.025,
             by_nature: false,
-            why: "A plan's taps have the right width together: of a frame a pixel wide only those of the middle are \
-                  left, which spread less. The exact effect has no such taps."
+            why: "A plan's taps have the right width only together, and a frame a pixel wide leaves those of the middle, \
+                  which spread too little. Take `ScreenSpace`."
                 .into(),
         }],
         run: Box::new(move |lab| {
@@ -108,17 +108,17 @@ fn odd(size: [u32; 2]) -> Case {
         group: Group::Numbers,
         name: format!("{}x{}", size[0], size[1]),
         what: "Flat skin under waves of light 4 mm long, 6 px/mm: the largest difference to the visible integral, along \
-               the frame's last rows and columns and in a raster over all of it."
+               the frame's last rows and columns, and at every fifth pixel of every fifth row."
             .into(),
-        passes: SEEN,
-        degrades: PLAIN,
+        passes: FOUND,
+        degrades: SEEN,
         why: ".01 is what an eye may find.".into(),
         known: vec![Known {
             method: "screen_planned",
             at_most: 0.022,
             by_nature: false,
-            why: "Along the frame's border taps are missing, and the light of coarse levels goes on as between the last \
-                  two pixels; frames of odd and of even sides are off alike. The exact effect is not."
+            why: "Along the frame's border taps are missing, and coarse levels are extrapolated from the last two pixels; \
+                  odd and even sides are off alike. Take `ScreenSpace`, or draw a wider frame."
                 .into(),
         }],
         run: Box::new(move |lab| {
@@ -149,7 +149,7 @@ fn large() -> Case {
                largest difference to the same in a frame of 192x192. In the full form alone."
             .into(),
         passes: EVEN,
-        degrades: SEEN,
+        degrades: FOUND,
         why: "Both frames know the same, and single floats hold the place of a pixel in a frame of 680 mm to .00006 mm."
             .into(),
         known: vec![],
@@ -214,13 +214,13 @@ fn too_large() -> Case {
     Case {
         group: Group::Numbers,
         name: "a size beyond the device's limit".into(),
-        what: "A host makes textures wider than the device allows, which wgpu reports to it; `Gpu::check_size` says so \
-               before. Every method takes them for a frame all the same, then a frame of 64x64 that it has had before: \
-               pixels of that which are no longer what they were. A panic, or a size that is not named, ends the run."
+        what: "A host makes textures wider than the device allows, which wgpu reports to it and `Gpu::check_size` beforehand. \
+               Each method gets them as a frame all the same, then one of 64x64 that it has had before: how many pixels \
+               of that have changed; infinitely many where nothing told the host. A panic ends the run."
             .into(),
         passes: 0.0,
         degrades: 1.0,
-        why: "wgpu has told the host of its mistake; the next frame is a frame like any other.".into(),
+        why: "wgpu has told the host of its mistake; the next frame is like any other.".into(),
         known: vec![],
         run: Box::new(|lab| {
             let gpu = &lab.gpu;

@@ -3,10 +3,10 @@
 use glam::{DVec2, DVec3, Vec3};
 use subsurface::{DEFAULT_MAX_ERROR, Gaussian, Plan, Profile};
 
-use super::{EVEN, PLAIN, SEEN};
+use super::EVEN;
 use crate::case::{Case, Group, Outcome};
 use crate::cases::surface::{Surface, methods, ours};
-use crate::cases::{Results, apart, worst};
+use crate::cases::{FOUND, Results, SEEN, apart, worst};
 use crate::common::{GBuffer, View, plane, sphere};
 
 pub fn cases(quick: bool) -> Vec<Case> {
@@ -36,22 +36,19 @@ fn width(name: &str, sigma_mm: f32, side: u32) -> Case {
     Case {
         group: Group::Numbers,
         name: format!("a profile {name}"),
-        what: if sigma_mm == 0.0 {
+        what: if narrow {
             "One Gaussian, a hard edge at 27 degrees on flat skin, 6 px/mm: the largest difference to the light as it \
-             was. Rivals are left out, since no kernel can be fitted to this profile."
-        } else if narrow {
-            "One Gaussian, a hard edge at 27 degrees on flat skin, 6 px/mm: the largest difference to the light as it \
-             was. Rivals have their kernels fitted to this profile; `jimenez_2009` is made for skin alone."
+             was. No kernel of a rival can be fitted to no width, and `jimenez_2009` is made for skin alone."
         } else {
             "One Gaussian, a hard edge at 27 degrees on flat skin, 6 px/mm: the largest difference to the visible \
              integral, which is the mean of all light in the frame. Rivals have their kernels fitted to this profile; \
              `jimenez_2009` is made for skin alone."
         }
         .into(),
-        passes: if narrow { EVEN } else { SEEN },
-        degrades: if narrow { SEEN } else { PLAIN },
+        passes: if narrow { EVEN } else { FOUND },
+        degrades: if narrow { FOUND } else { SEEN },
         why: if narrow {
-            "Light that goes nowhere stays as it is, to two steps of a half float; .01 is what an eye may find."
+            "light that goes nowhere stays as it is; .002 is four steps of a half float, .01 what an eye may find."
         } else {
             ".01 is what an eye may find."
         }
@@ -100,12 +97,12 @@ fn unit(name: &str, mm_per_unit: f32, side: u32) -> Case {
     Case {
         group: Group::Numbers,
         name: format!("a scene in {name}"),
-        what: "A ball of 12 mm lit from one side, in perspective, 3 px/mm, where a unit of the scene is that long: the \
-               largest difference to the same method's result of a scene in millimetres."
+        what: "A ball of 12 mm lit from one side, in perspective, 3 px/mm, the scene in these units: the largest difference to \
+               the same method's result in millimetres."
             .into(),
         passes: EVEN,
-        degrades: SEEN,
-        why: "The picture is the same; two steps of half floats are .001.".into(),
+        degrades: FOUND,
+        why: "the picture is the same but for the rounding of half floats; .002 is four steps of them.".into(),
         known: vec![],
         run: Box::new(move |lab| {
             let view = View::perspective([side; 2], 0.0625 * f64::from(side));

@@ -53,7 +53,7 @@ fn case(name: &str, what: &str, is_whole: bool, known: Vec<Known>, run: crate::c
         what: format!("{what}, 4 px/mm: the largest difference within 8 mm of the border to {held_to}."),
         passes: FOUND,
         degrades: SEEN,
-        why: ".01 is what an eye may find in a gradient, and what pops where something enters the picture.".into(),
+        why: ".01 is what an eye may find in a gradient, and what jumps when something enters the picture.".into(),
         known,
         run,
     }
@@ -93,21 +93,22 @@ fn edge(is_whole: bool, quick: bool) -> Case {
         }
         .run(lab)
     });
-    let what = "An edge of light, soft by a pixel, that leaves the frame at 27 degrees";
+    let what = "An edge of light with a σ of a pixel that leaves the frame at 27 degrees";
     case("an edge at the border", what, is_whole, known, run)
 }
 
 /// What a plan makes of the border.
 fn goes_on(at_most: f64) -> Vec<Known> {
-    let why = "Its pyramid goes on beyond the frame as it ends, which is nearer to the truth where light does, too, but is not what \
-               is seen. Draw a frame that is 8 mm wider on all sides, or take ScreenSpace.";
+    let why = "Beyond the frame its pyramid continues the light at the border. Where the light itself goes on so, that is \
+               nearer to the whole truth, but it is not what is seen. Draw a frame that is 8 mm wider on all sides, or take \
+               `ScreenSpace`.";
     vec![known("screen_planned", at_most, why)]
 }
 
 /// What no method in screen space is spared.
 fn not_seen(at_most: f64) -> Vec<Known> {
-    let why = "What lies outside of the frame lights what is inside, and nothing tells. Draw a frame that is 8 mm wider on all \
-               sides and cut it after scattering, or take TextureSpace.";
+    let why = "Light from outside the frame reaches its inside, and the frame does not hold it. Draw a frame that is 8 mm \
+               wider on all sides and crop it after scattering, or take `TextureSpace`.";
     ["screen_exact", "screen_planned"]
         .map(|method| by_nature(method, at_most, why))
         .into()
@@ -144,11 +145,11 @@ fn half_a_head(is_whole: bool, quick: bool) -> Case {
         .run(lab)
     });
     let what = if is_whole {
-        "A ball of 10 mm around a point of the border, lit from 60 degrees outside of the frame, where it lies \
-         within 60 degrees of facing the camera"
+        "A ball of 10 mm radius whose middle lies on the border, lit at 60 degrees from outside the frame, where it is \
+         turned by less than 60 degrees from the camera"
     } else {
-        "A ball of 10 mm around a point of the border, lit from 60 degrees outside of the frame, but for a rim \
-         of a pixel"
+        "A ball of 10 mm radius whose middle lies on the border, lit at 60 degrees from outside the frame, without a rim \
+         of one pixel"
     };
     case("half a head", what, is_whole, known, run)
 }

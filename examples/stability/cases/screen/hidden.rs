@@ -8,12 +8,13 @@ use super::scene::{Form, Scene, Surface, from_camera, lambert};
 use super::trial::{Trial, Truth, middle};
 use super::{FOUND, SEEN, by_nature, known};
 use crate::case::{Case, Group, Known, Run};
+use crate::cases::unpictured;
 use crate::common::{Hit, View};
 
 pub fn cases(quick: bool) -> Vec<Case> {
     vec![
         slab(1.5),
-        slab(4.0),
+        unpictured(slab(4.0)),
         cylinder("the rim of an ear", 0.75, 150.0, [40, 160]),
         cylinder("a finger", 8.0, 90.0, [160, 64]),
         cylinder("a finger", 8.0, 130.0, [160, 64]),
@@ -37,10 +38,9 @@ fn case(name: String, what: String, known: Vec<Known>, run: Run) -> Case {
 
 /// A lit face behind a dark one, as of an ear.
 fn slab(thickness_mm: f64) -> Case {
-    let what = format!(
-        "Two faces {thickness_mm} mm apart, the hidden one lit by 1 and the seen one not at all, 4 px/mm: the difference to \
-         what Eq. 7 passes, in texture space with an island for each."
-    );
+    let what = "Two faces this far apart, the hidden one lit by 1 and the visible one not at all, 4 px/mm: the difference to what \
+                Eq. 7 as printed passes (divided by the kernel's mass it would pass less). In texture space each face has an \
+                island.";
     let run = Box::new(move |lab: &_| {
         const SIDE_MM: f64 = 24.0;
         let view = View::orthographic([96; 2], 4.0);
@@ -67,12 +67,12 @@ fn slab(thickness_mm: f64) -> Case {
     known.push(self::known(
         "texture_separable",
         at_most,
-        "It knows the hidden face, but sums along the atlas, where the two faces of an ear lie apart; only near the rim, \
-         around which the atlas goes on, light gets through. Add what a thickness passes.",
+        "It knows the hidden face, but sums along the atlas, where the two faces of an ear lie apart: light gets around a \
+         rim, not through the middle. Add transmission by thickness.",
     ));
     case(
         format!("an ear {thickness_mm} mm thick, lit from behind"),
-        what,
+        what.into(),
         known,
         run,
     )
@@ -81,8 +81,8 @@ fn slab(thickness_mm: f64) -> Case {
 /// Lit from so many degrees off the camera's direction.
 fn cylinder(part: &'static str, rho_mm: f64, degrees: f64, texels: [u32; 2]) -> Case {
     let what = format!(
-        "A cylinder of {rho_mm} mm, lit from {degrees} degrees off the camera's direction, 4 px/mm: the largest \
-         difference to the integral around all of it{}.",
+        "A cylinder of {rho_mm} mm radius, lit at {degrees} degrees from the camera's direction, 4 px/mm: the largest \
+         difference to the closed form of all of it{}.",
         within(degrees)
     );
     let run = Box::new(move |lab: &_| {
@@ -124,8 +124,8 @@ fn cylinder(part: &'static str, rho_mm: f64, degrees: f64, texels: [u32; 2]) -> 
 fn head(degrees: f64, quick: bool) -> Case {
     const RHO_MM: f64 = 10.0;
     let what = format!(
-        "A ball of {RHO_MM} mm, lit from {degrees} degrees off the camera's direction, 4 px/mm: the largest difference \
-         to the integral over all of it{}.",
+        "A ball of {RHO_MM} mm radius, lit at {degrees} degrees from the camera's direction, 4 px/mm: the largest difference \
+         to the closed form of all of it{}.",
         within(degrees)
     );
     let run = Box::new(move |lab: &_| {
@@ -167,16 +167,16 @@ fn name(part: &str, degrees: f64) -> String {
 /// From the side both sides of the terminator are seen.
 fn within(degrees: f64) -> &'static str {
     if degrees > 90.0 {
-        ", a rim of a pixel left out"
+        ", without a rim of one pixel"
     } else {
-        ", past the terminator and before it, within 60 degrees of facing the camera"
+        ", where it is turned by less than 60 degrees from the camera"
     }
 }
 
 /// What the exact effect and a plan miss of light that the camera does not see.
 fn unseen([exact, planned]: [f64; 2]) -> Vec<Known> {
-    let why = "The frame holds no light of what it does not show. Take TextureSpace where the surface is lit around a rim, add \
-               what a thickness passes where it is lit from behind.";
+    let why = "The frame holds no light of what it does not show. Take `TextureSpace` where light comes around a rim, and add \
+               transmission by thickness where it comes through.";
     vec![
         by_nature("screen_exact", exact, why),
         by_nature("screen_planned", planned, why),

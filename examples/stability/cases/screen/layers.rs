@@ -6,25 +6,29 @@ use super::scene::{Form, Scene, Surface};
 use super::trial::{Trial, Truth, middle};
 use super::{FOUND, SEEN, known};
 use crate::case::{Case, Group, Known};
+use crate::cases::unpictured;
 use crate::common::View;
 
 /// What may cross 10 mm of air or more.
 const LEAK: f64 = 0.0005;
 
-const WHY_LEAK: &str = "What crosses 10 mm of air is under .0001 by the skin profile, so that .0005, a half \
-     float's step below white, is a leak.";
+const WHY_LEAK: &str = "by the skin profile less than .0001 crosses 10 mm of air, so that more than .0005, a half float's \
+     step below white, is a leak.";
 
-const COARSE: &str = "A coarse pixel keeps one surface, and what it leaves out is missing nearby. Take ScreenSpace where layers lie \
-     close, or another profile for each head.";
+const COARSE: &str = "A coarse pixel keeps one surface, and the light of the other is missing nearby. Take `ScreenSpace` where layers \
+     lie close together in the picture, or give each head a profile of its own.";
 
-const FOLD: &str = "Two passes are not quite the full sum on a bent surface, and least where two rims meet; normals do not help \
-     (.016). Another profile for each head keeps them apart.";
+const FOLD: &str = "On a curved surface two passes differ a little from the full sum, most of all where two rims meet; a normal \
+     texture does not help (.016). A profile of its own for each head keeps them apart.";
 
-const ISLANDS: &str = "It sums along the surface, an island at a time, and Eq. 7 counts light that crosses air as well. Where \
-     layers lie apart nothing is lost by that; where they touch, take ScreenSpace.";
+const ISLANDS: &str = "It sums along the surface, one island at a time, while Eq. 7 also counts what crosses the gap. Across air that is \
+     no fault: no skin carries that light. Where layers touch, take `ScreenSpace`.";
 
 pub fn cases(quick: bool) -> Vec<Case> {
     let gaps = [1.0, 2.0, 5.0, 10.0, 20.0].map(|gap_mm| layers(gap_mm, quick));
+    // Gaps of 2 and 10 mm look as those of 1 and 20.
+    let [one, two, five, ten, twenty] = gaps;
+    let gaps = [one, unpictured(two), five, unpictured(ten), twenty];
     gaps.into_iter().chain(heads(quick)).collect()
 }
 
@@ -35,16 +39,16 @@ fn layers(gap_mm: f64, quick: bool) -> Case {
     Case {
         group: Group::Screen,
         name: format!("layers {gap_mm} mm apart"),
-        what: "A dark half-plane before a lit plane, the edge at 27 degrees, 6 px/mm: the largest \
-               difference to the visible integral on either, in texture space to what both layers, \
-               hidden parts included, scatter by Eq. 7, through air as through skin."
+        what: "A dark half-plane before a lit plane, its edge at 27 degrees, 6 px/mm: the largest difference to the \
+               visible integral on either. In texture space it is that to Eq. 7 over both layers, hidden parts \
+               included. Both count what crosses the air between the layers as if it were skin."
             .into(),
         passes: if is_far { LEAK } else { FOUND },
         degrades: SEEN,
         why: if is_far {
             WHY_LEAK.into()
         } else {
-            "Layers that are near do exchange light by Eq. 7; .01 is what an eye may find in a gradient.".into()
+            "by Eq. 7 near layers exchange light; .01 is what an eye may find in a gradient.".into()
         },
         known: leaks(gap_mm),
         run: Box::new(move |lab| {
@@ -79,18 +83,19 @@ fn heads(quick: bool) -> Vec<Case> {
             group: Group::Screen,
             name: name.into(),
             what: format!(
-                "A dark ball of 10 mm, and a lit one {apart_mm} mm to its right and {behind_mm} mm behind it, 4 px/mm: \
-                 the largest difference to the visible integral {}, a rim of a pixel left out.",
+                "A dark ball of 10 mm radius, and a lit one {apart_mm} mm to its right and {behind_mm} mm behind it, 4 px/mm: \
+                 the largest difference to the visible integral {}, without a rim of one pixel.",
                 if touch {
-                    "around where they touch, in texture space to the integral over both whole"
+                    "around where they touch, in texture space to Eq. 7 over all of both"
                 } else {
-                    "where they meet in the picture, in texture space to the light on each, which is the same all over it"
+                    "where they meet in the picture, in texture space to each ball's own even light"
                 }
             ),
             passes: if touch { FOUND } else { LEAK },
             degrades: SEEN,
             why: if touch {
-                "By Eq. 7 skin that touches exchanges light; .01 is what an eye may find in a gradient.".into()
+                "by Eq. 7 near layers exchange light; .01 is what an eye may find in a gradient."
+                    .into()
             } else {
                 WHY_LEAK.into()
             },

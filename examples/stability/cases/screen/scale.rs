@@ -8,13 +8,18 @@ use super::scene::{Form, Scene, Surface};
 use super::trial::{Trial, Truth, middle};
 use super::{FOUND, REACH_MM, SEEN, STEP, known};
 use crate::case::{Case, Group};
+use crate::cases::unpictured;
 use crate::common::{Hit, View};
 
 /// σ of skin's red, in mm.
 const SIGMA_MM: f64 = 1.176;
 
 pub fn cases(quick: bool) -> Vec<Case> {
-    let widths = [0.1, 0.5, 2.0, 10.0, 50.0, 200.0].map(|width_px| kernel(width_px, quick));
+    let widths = [0.1, 0.5, 2.0, 10.0, 50.0, 200.0].map(|width_px| match width_px {
+        // As 10 and 200 px.
+        50.0 => unpictured(kernel(width_px, quick)),
+        _ => kernel(width_px, quick),
+    });
     let small = [line(), freckles()];
     widths.into_iter().chain(small).collect()
 }
@@ -29,25 +34,23 @@ fn kernel(width_px: f64, quick: bool) -> Case {
         group: Group::Screen,
         name: format!("kernel of {width_px} px"),
         what: format!(
-            "An edge of light at 27 degrees, soft by a pixel, on skin that faces the camera at {px_per_mm:.2} px/mm, \
-             where red has a σ of {width_px} px: the largest difference in the middle 24 by 12 pixels to {}.",
+            "An edge of light at 27 degrees, with a σ of a pixel, on skin that faces the camera, at such a distance that the \
+             profile's red has this σ in the picture (1.18 mm): the largest difference in the middle 24 by 12 pixels to {}.",
             if is_cut {
-                "the visible integral, since the frame cuts the kernel on all sides; in texture space, whose atlas is \
-                 that frame, too"
+                "the visible integral, since the frame cuts the kernel on all sides, as it does the atlas of texture space"
             } else {
-                "the integral on paper"
+                "the closed form"
             }
         ),
         passes: STEP,
         degrades: SEEN,
-        why: "A step of eight bits is what flat skin is kept to at any distance.".into(),
+        why: "a step of eight bits, which flat skin is to keep at any distance.".into(),
         known: if width_px > 100.0 {
             vec![known(
                 "screen_planned",
                 0.27,
-                "A plan's pyramid has seven levels, and its last is as wide as the widest Gaussian of skin at 47 px/mm \
-                 (σ = 128 px, red 55 px). From there on kernels keep their width in pixels and are too narrow. Take \
-                 ScreenSpace that close up.",
+                "The last of the pyramid's seven levels is as wide as the widest Gaussian of skin at 47 px/mm (where red has a σ \
+                 of 55 px). Closer up, kernels keep that width in pixels and are too narrow. Take `ScreenSpace` there.",
             )]
         } else {
             vec![]
@@ -91,13 +94,12 @@ fn small(name: &str, what: &str, px_per_mm: f64, light: fn(DVec3) -> f64) -> Cas
         group: Group::Screen,
         name: name.into(),
         what: format!(
-            "{what} The frame has it or misses it; the figure is what the method adds to that: the largest difference to \
-             the visible integral of that frame, in texture space of the same in an atlas."
+            "{what} Pixels hit or miss it, which is no method's fault; the figure is the largest \
+             difference to the visible integral of the frame as it is, and of an atlas of the same values."
         ),
         passes: FOUND,
         degrades: SEEN,
-        why: "Pixels cannot tell what lies between them, so that no weights are right to .0026; .01 is what an eye \
-              may find."
+        why: ".01 is what an eye may find. Light by the pixel is not known between pixels: the truth itself is good to .0026."
             .into(),
         known: vec![],
         run: Box::new(move |lab| {

@@ -8,6 +8,7 @@ use super::scene::{Form, Scene, Surface, from_camera, lambert};
 use super::trial::{Trial, Truth, middle};
 use super::{FOUND, SEEN, known};
 use crate::case::{Case, Group, Known};
+use crate::cases::unpictured;
 use crate::common::{Hit, View};
 
 /// Where the light comes from, off the camera's own direction and across the part.
@@ -17,7 +18,11 @@ pub fn cases(quick: bool) -> Vec<Case> {
     let finger = ("a finger", 8.0, 48, [160, 64]);
     let rim = ("the rim of an ear", 0.75, 16, [40, 160]);
     let backgrounds = [("black", 0.0), ("bright", 4.0)];
-    let part = |part| backgrounds.map(|background| case(part, background, quick));
+    let part = |part| {
+        let [black, bright] = backgrounds.map(|background| case(part, background, quick));
+        // Of the background nothing is shown.
+        [black, unpictured(bright)]
+    };
     [part(finger), part(rim)].into_iter().flatten().collect()
 }
 
@@ -31,13 +36,14 @@ fn case(
         group: Group::Screen,
         name: format!("{part} before {behind}"),
         what: format!(
-            "A cylinder of {rho_mm} mm at 27 degrees, lit from {LIGHT_DEGREES} degrees aside, before a background of \
-             {background}, 4 px/mm: the largest difference to the visible integral, a rim of a pixel left out, in \
-             texture space to the integral around the whole of it."
+            "A cylinder of {rho_mm} mm radius at 27 degrees in the picture, lit from {LIGHT_DEGREES} degrees to the side, \
+             before a background of light 0 or 4, 4 px/mm: the largest difference to the visible integral, without a \
+             rim of one pixel; in texture space to the closed form of all of it."
         ),
         passes: FOUND,
         degrades: SEEN,
-        why: "A halo or a dark line of .01 is what an eye may find; the rim's own pixels are a guess.".into(),
+        why: "a halo or a dark line of .01 is what an eye may find; the slopes of the rim's own pixels are a guess, so \
+              that they do not count.".into(),
         known: if rho_mm < 1.0 { thin() } else { vec![] },
         run: Box::new(move |lab| {
             let view = View::orthographic([128; 2], 4.0);
@@ -74,15 +80,15 @@ fn thin() -> Vec<Known> {
         known(
             "screen_exact",
             0.045,
-            "The outer pixels stand for most of its area, and how much they do follows from their slope, a guess where it \
-             comes from the depth of neighbours. With normals handed in it is .0052 where it was .021 without. The truth, too, takes \
-             the slope at a pixel's middle for all of the pixel. TextureSpace knows all of it.",
+            "Most of its area lies in the outer pixels, and a pixel's area follows from its slope, which is a guess where it \
+             comes from the depth of neighbours. With a normal texture the error falls from .021 to .0052. Take normals, or \
+             `TextureSpace`.",
         ),
         known(
             "screen_planned",
             0.043,
-            "The same, and what a coarse pixel keeps of a part that is narrower than itself; with normals handed in it is .021 where it was .030. \
-             Take ScreenSpace with normals, or TextureSpace.",
+            "As `screen_exact`; besides, a coarse pixel is wider than the part. With a normal texture the error falls from .030 to \
+             .021. Take `ScreenSpace` with normals, or `TextureSpace`.",
         ),
     ]
 }
