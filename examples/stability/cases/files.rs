@@ -14,65 +14,66 @@ pub fn cases(quick: bool) -> Vec<Case> {
         case(
             "glTF, cut short",
             "The built-in head, cut off after every 16 kB (1 kB in full).",
-            move || gltf::cut(step),
+            move || gltf::containers::cut(step),
         ),
         case(
             "glTF, cut short and closed",
-            "The same, with the lengths of the file and its chunks as if that were all; its JSON every kB.",
-            move || gltf::cut_and_closed(step),
+            "The same, with the file's and chunks' lengths made to fit; its JSON is cut after every kB.",
+            move || gltf::containers::cut_and_closed(step),
         ),
         case(
             "glTF, headers and chunks",
-            "Magic, versions, lengths and kinds of chunks that are wrong; JSON that is none, or 100000 deep.",
-            gltf::containers,
+            "Wrong magic numbers, versions, lengths and kinds of chunks; what is not JSON, and JSON that is nested 100000 deep.",
+            gltf::containers::containers,
         ),
         case(
             "glTF, counts and offsets",
-            "A square whose counts, offsets, lengths and strides are negative, broken, too large by one or by 2⁶⁴, or text.",
-            gltf::extents,
+            "A square whose counts, offsets, lengths and strides are negative, fractions, too large by anything from one to 2⁶⁴, or \
+             text.",
+            gltf::references::extents,
         ),
         case(
             "glTF, references",
-            "Indices of vertices, accessors, views, images, materials and nodes that do not exist; types that \
-             do not fit; sparse accessors, which are not read.",
-            gltf::references,
+            "Indices of vertices, accessors, views, images, materials and nodes that do not exist; types \
+             that do not fit; sparse accessors, which the reader refuses.",
+            gltf::references::references,
         ),
         case(
             "glTF, nodes",
-            "Nodes in circles, nodes that are shared, and chains and fans of 100000, which are to be read.",
-            gltf::nodes,
+            "Nodes in circles and shared nodes, which are to be refused; chains and fans of 100000 nodes, which are to be read.",
+            gltf::nodes::nodes,
         ),
         case(
             "glTF, numbers",
             "NaN and infinity in positions, normals and UVs, by bytes and by transforms that overflow; numbers of \
              materials beyond their ranges, which may be clamped.",
-            gltf::numbers,
+            gltf::numbers::numbers,
         ),
         case(
             "glTF, images",
-            "A PNG and a JPEG up to each of their bytes, headers that claim up to 4294967295 pixels a side, data \
-             URIs that are damaged.",
-            gltf::images,
+            "A PNG and a JPEG cut off after each of their bytes, headers that claim up to 4294967295 pixels a side, damaged data \
+             URIs.",
+            gltf::images::images,
         ),
         case(
             "glTF, buffers",
-            "Buffers that are missing, short, in a file, or data URIs that are damaged.",
-            gltf::buffers,
+            "Buffers that are missing, too short, in another file, or damaged data URIs.",
+            gltf::buffers::buffers,
         ),
         case(
             "glTF, nothing to draw",
-            "Scenes without a triangle, to be refused; without skin, to be read.",
-            gltf::nothing,
+            "Scenes without a triangle, which are to be refused; scenes without skin, which are to be read.",
+            gltf::nodes::nothing,
         ),
         case(
             "glTF, small files that ask for much",
-            "Meshes that 3000 nodes draw, and points that 30000 nodes would, were points drawn.",
-            gltf::demands,
+            "30000 vertices that 3000 nodes draw, or 30000 points that 30000 nodes do: less than a megabyte each.",
+            gltf::nodes::demands,
         ),
         case(
             "profile, JSON",
-            "The skin profile up to each of its bytes; wrong types, signs, counts and sums; widths and sums that are \
-             odd and to be read. (Dumps of other programs, gbuffer.json and EXR, are tried the same way by \
+            "The skin profile cut off after each of its bytes; wrong types, signs, counts and sums; unusual widths and sums, \
+             which are to be read. (Dumps of other programs, gbuffer.json and EXR, are tried the same way by \
              `cargo test --release --example filter`.)",
             profile::all,
         ),
@@ -83,14 +84,13 @@ fn case(name: &str, inputs: &str, attempts: impl Fn() -> Vec<Attempt> + 'static)
     Case {
         group: Group::Files,
         name: name.into(),
-        what: format!(
-            "{inputs} The figure is of how many the reader panicked, took longer than 20 s, asked for more than 2 GiB \
-             (where the system tells), took what is wrong or kept something that its documentation rules out, or \
-             refused what is right."
-        ),
+        what: inputs.into(),
         passes: 0.0,
         degrades: 0.0,
-        why: "Each of them is a program that goes down, or draws nonsense, by a file.".into(),
+        why: "the figure counts the inputs that make the reader panic, take longer than 20 s or ask for 2 GiB more than the \
+              run ever had (where the system tells); that are wrong and are taken, or right and refused; or of which it \
+              keeps what its documentation rules out. Any one of them crashes a program or has it draw nonsense."
+            .into(),
         known: vec![],
         run: Box::new(move |_| {
             let faults: Vec<String> = attempts().into_iter().filter_map(Attempt::fault).collect();
