@@ -4,24 +4,28 @@
 //! does, too. In the pictures a frame is a row: what swings shows as unrest down the columns.
 
 mod atlas;
-mod camera;
+mod follow;
 mod light;
+mod pan;
+mod roll;
 mod track;
+mod zoom;
 
+use super::{FOUND, REACH_MM, SEEN, STEP};
 use crate::case::Case;
 
-/// What an eye may see move: a step of eight bits.
-const STEP: f64 = 1.0 / 255.0;
+const PX_PER_MM: f64 = 4.0;
 
-/// What it sees without looking for it, as for errors that stand still.
-const SEEN: f64 = 0.01;
+const WHY_SWING: &str = "1/255 is a step of eight bits, which an eye sees where it comes and goes; .01 is what it \
+                         sees without looking for it.";
 
-/// What the skin profile reaches in mm: 3.5 σ of its widest Gaussian. Closer to the frame's edge kernels
-/// are cut, and the closed forms do not hold.
-const REACH_MM: f64 = 9.6;
+const WHY_STEP: &str = "1/255 is a step of eight bits, and from one frame to the next a jump that an eye may see; .01 is one that \
+                        it does.";
 
 pub fn cases(quick: bool) -> Vec<Case> {
-    let mut cases = camera::cases(quick);
+    let mut cases = pan::cases(quick);
+    cases.push(roll::case(quick));
+    cases.push(zoom::case(quick));
     cases.extend(light::cases(quick));
     cases
 }

@@ -7,17 +7,15 @@ use glam::{DVec2, DVec3, Vec3};
 use subsurface::truth::closed_form::{scattered_cosine, scattered_step, step};
 use subsurface::{Error, Profile};
 
-use super::super::{Crop, Results, largest};
+use super::super::{Crop, Results, largest, unpictured};
 use super::atlas::{Sheet, sphere_uv, unwrapped_sphere};
 use super::track::Track;
-use super::{SEEN, STEP};
+use super::{FOUND, PX_PER_MM, SEEN, STEP, WHY_STEP, WHY_SWING};
 use crate::case::{Case, Group, Outcome, Run};
 use crate::common::{GBuffer, Hit, View, plane, sphere};
 use crate::frame::Texels;
 use crate::lab::Lab;
 use crate::unwrapped::Unwrapped;
-
-const PX_PER_MM: f64 = 4.0;
 
 pub fn cases(quick: bool) -> Vec<Case> {
     let mut cases = turning_light(quick);
@@ -123,33 +121,29 @@ fn turning_light(quick: bool) -> Vec<Case> {
         }
         Ok(track)
     };
-    let scene = "A sphere of 10 mm at 4 px/mm under a light that turns by a degree a frame, its terminator crossing \
-                 what is seen, where n_z is above .5;";
+    let what = "A sphere of 10 mm radius at 4 px/mm under a light that turns by a degree a frame, its terminator crossing what is \
+                seen; where n_z is above .5, against the closed form. Step: the most that the error at a pixel changes by from \
+                one frame to the next. Error: the largest of all frames.";
     let shared = Shared::default();
     vec![
         Case {
             group: Group::Time,
             name: "light turns: step".into(),
-            what: format!(
-                "{scene} the most that the error at a pixel changes by from one frame to the next, against the \
-                 closed form of the whole sphere."
-            ),
+            what: what.into(),
             passes: STEP,
-            degrades: SEEN,
-            why: "A step of eight bits from one frame to the next is a pop that an eye may see; .01 is one that it \
-                  does."
-                .into(),
+            degrades: FOUND,
+            why: WHY_STEP.into(),
             known: vec![],
             run: looks_at(&shared, turn.clone(), Track::step, middle_row(ON_BALL)),
         },
         Case {
             group: Group::Time,
             name: "light turns: error".into(),
-            what: format!("{scene} the largest error of all frames, against the same."),
-            passes: SEEN,
-            degrades: 0.03,
-            why: "As for a picture that stands still: .01 is what an eye may find in a gradient, .03 what it does \
-                  find."
+            what: what.into(),
+            passes: FOUND,
+            degrades: SEEN,
+            why: "as for a picture that stands still, .01 is what an eye may find in a gradient, .03 what is seen at a \
+                  glance."
                 .into(),
             known: vec![],
             run: looks_at(&shared, turn, Track::worst, middle_row(ON_BALL)),
@@ -161,13 +155,13 @@ fn off_and_on() -> Case {
     Case {
         group: Group::Time,
         name: "light switched off and on".into(),
-        what: "The same sphere lit, in the next frame black, then lit as before: the largest value of the black frame's \
-               result, or the largest difference of the third's to the first's, whichever is more."
+        what: "The same sphere in three frames, lit, black, and lit as before: the largest value of the black frame's result, or \
+               the largest difference between those of the others, whichever is more."
             .into(),
         passes: 0.0,
         degrades: STEP,
-        why: "A method without memory gives black for black, and the same for the same to the last bit; an \
-              afterglow shows from a step of eight bits on."
+        why: "a method without memory makes black of black, and the same of the same to the last bit; an afterglow is \
+              seen from a step of eight bits on."
             .into(),
         known: vec![],
         run: Box::new(|lab| {
@@ -231,14 +225,16 @@ fn moving_edge(quick: bool) -> Vec<Case> {
         }
         Ok(track)
     };
-    let scene = "A shadow's edge at 27 degrees, soft by a pixel at 4 px/mm, that draws back over a plane by an eighth of a \
-                 pixel a frame; within 3 mm of its middle, against the closed form (the atlas \
-                 has its texels where the frame has its pixels, so that nothing of a fetch counts),";
+    let what = "A shadow's edge at 27 degrees, with a σ of a pixel at 4 px/mm, draws back over a plane by an eighth of a pixel a \
+                frame; within 3 mm of its middle, against the closed form. A texel is a pixel, so that fetches change nothing. \
+                Error: the largest of all frames. Swing: the most that the error at a pixel swings, from peak to peak. Never \
+                darker: the most that a pixel falls by from one frame to the next, where all light rises. In the picture a \
+                frame is a row.";
     let shared = Shared::default();
-    let case = |name: &str, what: &str, passes, degrades, why: &str, figures| Case {
+    let case = |name: &str, passes, degrades, why: &str, figures| Case {
         group: Group::Time,
         name: format!("shadow moves: {name}"),
-        what: format!("{scene} {what} In the picture a frame is a row."),
+        what: what.into(),
         passes,
         degrades,
         why: why.into(),
@@ -248,27 +244,19 @@ fn moving_edge(quick: bool) -> Vec<Case> {
     vec![
         case(
             "error",
-            "the largest error of all frames.",
             STEP,
-            SEEN,
-            "A step of eight bits; .01 is what an eye may find in a gradient.",
+            FOUND,
+            "1/255 is a step of eight bits; .01 is what an eye may find in a gradient.",
             Track::worst,
         ),
-        case(
-            "swing",
-            "the most that the error at a pixel swings, from peak to peak.",
-            STEP,
-            SEEN,
-            "A step of eight bits, which an eye sees where it comes and goes; .01 is what it sees without looking for it.",
-            Track::swing,
-        ),
+        // The picture of the error shows it.
+        unpictured(case("swing", STEP, FOUND, WHY_SWING, Track::swing)),
         case(
             "never darker",
-            "the most that a pixel falls by from one frame to the next, where all light rises.",
             HALF_STEP,
             STEP,
-            "Half floats have steps of 2^-11 below white, so that a result may fall by one where its value \
-             hardly moves; more is the method's, and a step of eight bits shows.",
+            "half floats have steps of .0005 below white, so that a result may fall by one where it hardly moves; 1/255 is a \
+             step of eight bits.",
             Track::fall,
         ),
     ]
