@@ -7,31 +7,30 @@ mod sheet;
 
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
-use super::{Results, worst};
-use crate::case::{Case, Group, Known, Outcome, Run};
+use super::{FOUND, Results, SEEN, STEP, unpictured, worst};
+use crate::case::{Case, Group, Known, Run};
 use flat::{HALF_MM, Island, Layout, SIDE_MM, Square};
 
 /// Of the largest difference.
 const LARGEST: Bounds = Bounds {
-    passes: 0.01,
-    degrades: 0.03,
-    why: ".01 is what an eye may find in a gradient; .03 is eight steps of 8 bits, an edge that all see.",
+    passes: FOUND,
+    degrades: SEEN,
+    why: ".01 is what an eye may find in a gradient; .03 is eight steps of eight bits, an edge that anyone sees.",
 };
 
 /// Of the root mean square.
 const MEAN: Bounds = Bounds {
-    passes: 0.01,
-    degrades: 0.03,
-    why: "1 % over a surface is within what two renderers differ by; at 3 % most of what scattering does \
-          to this edge is lost.",
+    passes: FOUND,
+    degrades: SEEN,
+    why: "two renderers may differ by 1 % over a surface; 3 % is half of what scattering does to this edge.",
 };
 
 /// Of what must be the same.
 const SAME: Bounds = Bounds {
     passes: 0.001,
-    degrades: 1.0 / 255.0,
-    why: ".001 is two steps of a half float near white, and of all else there is nothing that could differ; \
-          1/255 is a step of 8 bits.",
+    degrades: STEP,
+    why: ".001 is two steps of a half float near white, and nothing else should differ; 1/255 is a step of eight \
+          bits.",
 };
 
 struct Bounds {
@@ -79,10 +78,10 @@ fn flat_squares(quick: bool) -> Vec<Case> {
     vec![
         case(
             "a seam along a light's edge",
-            "A flat square under an edge of light that is soft by .5 mm, cut along that edge into two islands \
-             that lie apart in the atlas, .19 mm a texel (.12 in full). Here and in all cases of the square: the \
-             largest difference over its middle 11 mm, in screen space, at 5 px/mm (8 in full), to the visible \
-             integral, in texture space, fetched at the same places, to the closed form.",
+            "A flat square under an edge of light with a σ of .5 mm, cut along that edge into two islands that lie apart in \
+             the atlas, .19 mm a texel (.12 in full). Here and in all cases of the square the figure is the largest \
+             difference over its middle 11 mm: in screen space, at 5 px/mm (8 in full), to the visible integral; in texture \
+             space, fetched bilinearly at the same places, to the closed form.",
             &LARGEST,
             known(SEAM, 0.26),
             flat::run(&upright, halves(), worst),
@@ -96,14 +95,14 @@ fn flat_squares(quick: bool) -> Vec<Case> {
         ),
         case(
             "stretch 1:2",
-            "One island of texels of .4 by .2 mm, the edge at 45 degrees and soft by 1 mm.",
+            "One island, texels of .4 by .2 mm, the edge at 45 degrees and with a σ of 1 mm.",
             &LARGEST,
             vec![],
             flat::run(&wide, whole(0.4 * DVec2::X, 0.2 * DVec2::Y), worst),
         ),
         case(
             "stretch 1:8",
-            "The same by texels of .4 by .05 mm.",
+            "The same with texels of .4 by .05 mm.",
             &LARGEST,
             vec![],
             flat::run(&wide, whole(0.4 * DVec2::X, 0.05 * DVec2::Y), worst),
@@ -116,18 +115,18 @@ fn flat_squares(quick: bool) -> Vec<Case> {
             vec![],
             flat::run(&diagonal, whole(u, sheared), worst),
         ),
-        case(
+        unpictured(case(
             "a mirrored island",
-            "The square lies in the atlas with left and right exchanged, beside another that does not, lies 100 \
-             mm behind and is lit the other way round; the edge at 27 degrees.",
+            "The square lies mirrored in the atlas, next to an island of another square, which is 100 mm behind it and lit \
+             where this one is dark; the edge at 27 degrees.",
             &LARGEST,
             vec![],
-            unpictured(flat::run(&diagonal, Layout::apart(2, mirrored), worst)),
-        ),
+            flat::run(&diagonal, Layout::apart(2, mirrored), worst),
+        )),
         case(
             "islands that overlap",
-            "Half of another square, 100 mm behind and lit the other way round, is drawn onto the texels of this \
-             one, which `Atlas` asks a host not to do; the edge at 27 degrees.",
+            "Half of another square, 100 mm behind and lit where this one is dark, is drawn onto the texels of this one, \
+             which `Atlas` asks a host not to do; the edge at 27 degrees.",
             &LARGEST,
             known(OVERLAP, 1.05),
             flat::run(&diagonal, whole(u, v).drawn_over(right_half), worst),
@@ -141,7 +140,7 @@ fn flat_squares(quick: bool) -> Vec<Case> {
         ),
         case(
             "twenty texels a mm",
-            "Of the atlas a strip across the edge, 2 mm wide; texture space is asked where that lies.",
+            "The atlas holds a strip across the edge, 2 mm wide; texture space is asked for that alone.",
             &LARGEST,
             vec![],
             flat::run(
@@ -150,17 +149,17 @@ fn flat_squares(quick: bool) -> Vec<Case> {
                 worst,
             ),
         ),
-        case(
+        unpictured(case(
             "one island",
-            "The edge at 27 degrees, all of the square in one piece: the relative root mean square of what the \
-             other cases show the largest of.",
+            "The edge at 27 degrees, the square in one piece. Here the figure is not the largest difference, but their root \
+             mean square over that of the truth.",
             &MEAN,
             vec![],
-            unpictured(flat::run(&diagonal, whole(u, v), relative_rms)),
-        ),
+            flat::run(&diagonal, whole(u, v), relative_rms),
+        )),
         case(
             "a hundred islands",
-            "The same, the square cut into ten by ten islands of 2.8 mm that lie apart and shuffled in the atlas.",
+            "The same, the square cut into ten by ten islands of 2.8 mm, shuffled and apart in the atlas.",
             &MEAN,
             known(SEAM, 0.06),
             flat::run(&diagonal, hundred(), relative_rms),
@@ -173,17 +172,16 @@ fn others(quick: bool) -> Vec<Case> {
         method: "screen_planned",
         at_most: 0.002,
         by_nature: false,
-        why: "A coarse pixel that covers two heads keeps the nearer one, so that the other lacks it; by half \
-              of the error that the plan was asked for. `ScreenSpace` where heads that almost touch in the \
-              picture must not."
+        why: "A coarse pixel that covers two heads keeps the nearer one, so that the other lacks light; by half of the \
+              error that the plan is made for. Take `ScreenSpace` where heads almost touch in the picture."
             .into(),
     };
     vec![
         case(
             "a cylinder's seam in view",
-            "A cylinder of 8 mm lit from 60 degrees to the side, all around one island whose seam faces the \
-             camera: the largest difference where it is turned by less than 73 degrees, in screen space to the \
-             visible integral, in texture space to the closed form.",
+            "A cylinder of 8 mm radius lit from 60 degrees to the side, unrolled into one island whose seam faces the \
+             camera: the largest difference where it is turned by less than 73 degrees from the camera, in screen space to \
+             the visible integral, in texture space to the closed form.",
             &LARGEST,
             known(SEAM, 0.08),
             cylinder::run(0.0, quick),
@@ -195,31 +193,29 @@ fn others(quick: bool) -> Vec<Case> {
             vec![],
             cylinder::run(180.0, quick),
         ),
-        case(
+        unpictured(case(
             "UVs outside of 0 to 1",
-            "A sheet with bumps of .5 mm, read from a glTF file and drawn by the renderer, which brings islands \
-             inside: the largest difference, from the same sheet with UVs from .05 to .95, by UVs that are whole \
-             tiles away, that lie across the border of a tile, and that take three tiles. Screen space looks at \
-             no UVs. Brought inside, an island may touch the border of its atlas, past which a fetch finds the \
-             last texel again.",
+            "A sheet with bumps of .5 mm, read from a glTF file and drawn by the renderer, which moves islands into the \
+             atlas. The figure is the largest difference to the same sheet with UVs from .05 to .95, over UVs that lie \
+             whole tiles away, across the border of a tile, and in three tiles. Screen space does not use UVs. A moved \
+             island may touch the atlas's border, past which a fetch repeats the last texel.",
             &LARGEST,
             vec![],
-            unpictured(sheet::run(&OUTSIDE)),
-        ),
+            sheet::run(&OUTSIDE),
+        )),
         case(
             "mirrored halves on one place",
-            "The same sheet, both halves of which have the same UVs, as a face that is painted once; the renderer \
-             draws each into a page of its own. Difference from the sheet in one piece.",
+            "The same sheet, both halves of which have the same UVs, as of a face that is painted once; the renderer draws \
+             each into a page of its own. The figure is the largest difference to the sheet in one piece.",
             &LARGEST,
             known(MIRROR, 0.032),
             sheet::run(&MIRRORED),
         ),
         case(
             "many heads",
-            "Nine balls of 8 mm, 1.5 mm apart in the picture and 40 mm or more in depth, each lit from a side of \
-             its own: the largest difference of a ball among the others from the same ball alone. In texture \
-             space each has its atlas, of two sizes in turn, all by one effect in one submission; what that costs \
-             grows by the head, which docs/results.md has.",
+            "Nine balls of 8 mm radius, 1.5 mm apart in the picture and 40 mm or more in depth, each lit from a side of its \
+             own: the largest difference of a ball among the others to the same ball alone. In texture space each has an \
+             atlas, of two sizes in turn, all by one effect in one submission.",
             &SAME,
             vec![nearer],
             heads::run(),
@@ -228,27 +224,26 @@ fn others(quick: bool) -> Vec<Case> {
 }
 
 const SEAM: (&str, bool) = (
-    "Passes along u and v end with the island. What lies across its seam is elsewhere in the atlas; its positions \
-     would tell where, to whoever searched all of it for every texel. Lay seams where skin is not seen, or use \
-     screen space.",
+    "Passes along u and v end with the island; what lies across its seam is elsewhere in the atlas, and finding it by \
+     position would mean to search the atlas for every texel. Lay seams where skin is not seen, or take `ScreenSpace`.",
     false,
 );
 
 const MIRROR: (&str, bool) = (
-    "The halves are pages of their own, and where they meet is a seam: see there. UVs of their own for both \
-     halves, or screen space.",
+    "Each half has a page of its own, and where they meet is a seam. Give each half UVs of its own, or take \
+     `ScreenSpace`.",
     false,
 );
 
 const OVERLAP: (&str, bool) = (
-    "A texel has room for one point. An atlas for each surface, as `renderer::Scene` has pages for them, or screen \
-     space.",
+    "A texel has room for one point. Give each surface an atlas, as `renderer::Scene` does by its pages, or take \
+     `ScreenSpace`.",
     true,
 );
 
 const COARSE: (&str, bool) = (
-    "Light that is finer than the texels is not in the atlas, and comes out in steps between them. Two texels for \
-     the narrowest edge of light, or screen space, whose pixels are as fine as they are seen.",
+    "Light that is finer than the texels is not in the atlas, and comes out in steps. Take two texels for the narrowest \
+     edge of light, or `ScreenSpace`.",
     true,
 );
 
@@ -260,16 +255,6 @@ fn known((why, by_nature): (&str, bool), at_most: f64) -> Vec<Known> {
         by_nature,
         why: why.into(),
     }]
-}
-
-/// For what would show the same as others do.
-fn unpictured(run: Run) -> Run {
-    Box::new(move |lab| {
-        Ok(Outcome {
-            shown: None,
-            ..run(lab)?
-        })
-    })
 }
 
 /// Whole tiles away, across a tile's border, and over three tiles.

@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3, Vec3};
 use subsurface::Error;
 
+use super::super::{larger, largest};
 use crate::case::{Outcome, Run};
 use crate::common::{GBuffer, Hit, View};
 use crate::frame::Texels;
@@ -128,9 +129,5 @@ fn unwrap(head: u32) -> Unwrapped {
 /// The largest difference; not a number where one is none.
 fn apart(pairs: impl Iterator<Item = (Vec3, Vec3)>) -> f64 {
     let differences = pairs.flat_map(|(a, b)| (a - b).abs().to_array());
-    differences.map(f64::from).fold(0.0, larger)
-}
-
-fn larger(a: f64, b: f64) -> f64 {
-    if b <= a { a } else { b }
+    largest(differences.map(f64::from))
 }

@@ -7,9 +7,10 @@ use glam::{Vec2, Vec3};
 use subsurface::renderer::{AtlasRenderer, Camera, Light, Lighting, Renderer, Scene};
 use subsurface::{Error, Profile, ScreenFrame};
 
-use super::super::{Crop, Results};
+use super::super::{Crop, Results, larger, largest};
 use crate::case::{Outcome, Run};
 use crate::lab::Lab;
+use crate::model::glb;
 
 const SIDE_MM: f32 = 24.0;
 /// Low enough to cast no shadow, whose edges would be as fine as a texel.
@@ -40,8 +41,8 @@ pub fn run(uvs: &'static [Uvs]) -> Run {
                         .zip(&b.1)
                         .zip(&is_skin)
                         .filter(|(_, skin)| **skin);
-                let differences = pairs.map(|((a, b), _)| f64::from((a - b).abs().max_element()));
-                *figure = differences.fold(*figure, |a, b| if b <= a { a } else { b });
+                let differences = pairs.flat_map(|((a, b), _)| (a - b).abs().to_array());
+                *figure = larger(*figure, largest(differences.map(f64::from)));
             }
             shown = results;
         }
@@ -67,7 +68,7 @@ pub fn run(uvs: &'static [Uvs]) -> Run {
 fn scatter(lab: &Lab, uv: Uvs) -> Result<(Results, Vec<bool>), Error> {
     const MM_PER_UNIT: f32 = 1000.0;
     let gpu = &lab.gpu;
-    let mut scene = Scene::from_glb(&glb(uv))?;
+    let mut scene = Scene::from_glb(&sheet(uv))?;
     for material in &mut scene.materials {
         // An even normal map of 8 bits is not quite flat, and leans the other way where UVs are mirrored.
         material.normal_scale = 0.0;
@@ -117,7 +118,7 @@ fn scatter(lab: &Lab, uv: Uvs) -> Result<(Results, Vec<bool>), Error> {
 }
 
 /// The sheet as a binary glTF file, in metres.
-fn glb(uv: Uvs) -> Vec<u8> {
+fn sheet(uv: Uvs) -> Vec<u8> {
     let corners = (0..=GRID).flat_map(|y| (0..=GRID).map(move |x| Vec2::new(x as f32, y as f32)));
     let corners: Vec<Vec2> = corners.map(|at| at / GRID as f32).collect();
     let positions: Vec<Vec3> = corners
@@ -148,7 +149,7 @@ fn glb(uv: Uvs) -> Vec<u8> {
     let greatest = ends.fold(Vec3::NEG_INFINITY, Vec3::max).to_array();
     let [positions_end, uvs_end] = [views[0].len(), views[0].len() + views[1].len()];
     let (vertices, corners) = (positions.len(), indices.len());
-    let mut json = format!(
+    let json = format!(
         r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}}}], "bufferViews": [
         {{"buffer": 0, "byteLength": {positions_end}}},
         {{"buffer": 0, "byteOffset": {positions_end}, "byteLength": {}}},
@@ -163,11 +164,5 @@ fn glb(uv: Uvs) -> Vec<u8> {
         views[1].len(),
         views[2].len(),
     );
-    // Chunks are whole words.
-    json += &" ".repeat(json.len().next_multiple_of(4) - json.len());
-    let lengths = [28 + json.len() + bytes.len(), json.len(), bytes.len()];
-    let [all, json_length, length] = lengths.map(|n| (n as u32).to_le_bytes());
-    let header = [&b"glTF\x02\0\0\0"[..], &all, &json_length, b"JSON"].concat();
-    let binary = [&length[..], b"BIN\0", &bytes].concat();
-    [&header[..], json.as_bytes(), &binary].concat()
+    glb(json.as_bytes(), &bytes)
 }
