@@ -204,7 +204,7 @@ impl Told {
 const INTRODUCTION: &str = "\
 # The failure atlas
 
-![Cases against methods](images/failures.png)
+![Cases against methods](images/failures.svg)
 
 Written by
 

@@ -6,7 +6,7 @@ use subsurface::truth::closed_form::{scattered_step, step};
 
 use super::scene::{Form, Scene, Surface};
 use super::trial::{Trial, Truth, middle};
-use super::{FOUND, REACH_MM, SEEN, STEP, known};
+use super::{FOUND, REACH_MM, SEEN, STEP};
 use crate::case::{Case, Group};
 use crate::cases::unpictured;
 use crate::common::{Hit, View};
@@ -45,16 +45,7 @@ fn kernel(width_px: f64, quick: bool) -> Case {
         passes: STEP,
         degrades: SEEN,
         why: "a step of eight bits, which flat skin is to keep at any distance.".into(),
-        known: if width_px > 100.0 {
-            vec![known(
-                "screen_planned",
-                0.27,
-                "The last of the pyramid's seven levels is as wide as the widest Gaussian of skin at 47 px/mm (where red has a σ \
-                 of 55 px). Closer up, kernels keep that width in pixels and are too narrow. Take `ScreenSpace` there.",
-            )]
-        } else {
-            vec![]
-        },
+        known: vec![],
         run: Box::new(move |lab| {
             let view = View::orthographic([side; 2], px_per_mm);
             let across = DVec2::from_angle(27f64.to_radians()).extend(0.0);
