@@ -88,6 +88,6 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
     let sines = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);
     // Light that is no number goes no further. What is packed is half floats, which end there.
-    let packed_light = select(vec4f(0.0), vec4f(min(light, vec3f(65504.0)), area), is_light);
+    let packed_light = select(vec4f(0.0), vec4f(clamp(light, vec3f(-65504.0), vec3f(65504.0)), area), is_light);
     return Surface(half_floats(packed_light), packed(id, z, sines));
 }

@@ -172,7 +172,12 @@ impl Scene {
         let ids =
             (!asked.no_ids).then(|| gpu.upload("id", self.size, TextureFormat::R8Uint, &self.id));
         let frame = ScreenFrame {
-            irradiance: &gpu.upload("irradiance", self.size, HALF, &halves(&self.irradiance)),
+            irradiance: &gpu.upload(
+                "irradiance",
+                self.size,
+                TextureFormat::Rgba32Float,
+                &self.irradiance,
+            ),
             depth: &gpu.upload("depth", self.size, TextureFormat::R32Float, &self.depth),
             profile_id: ids.as_ref(),
             normal: None,
@@ -483,6 +488,23 @@ fn light_that_is_no_number_goes_no_further() {
 }
 
 #[test]
+fn light_beyond_half_floats_stays_a_number() {
+    let mut bright = Scene::new();
+    let at = |x: u32, y: u32| (y * SIZE[0] + x) as usize;
+    let (first, second) = (at(60, 40), at(50, 30));
+    assert!(bright.id[first] == 1 && bright.id[second] == 1);
+    bright.irradiance[first] = [1e9, 1.0, 1.0, 1.0];
+    bright.irradiance[second] = [1.0, -1e9, 1.0, 1.0];
+    for planned in [false, true] {
+        let out = bright.scattered(planned, Asked::default());
+        assert!(
+            out.iter().flatten().all(|c| c.is_finite()),
+            "planned: {planned}"
+        );
+    }
+}
+
+#[test]
 fn normals_say_what_depth_says() {
     let view = View::orthographic([112, 112], 4.0);
     let light = DVec3::new(1.0, 0.0, 1.0).normalize();
@@ -537,11 +559,9 @@ fn normals_say_what_depth_says() {
         println!(
             "planned: {planned}, red RMS to the visible integral by depth {depth:.5}, by normals {normal:.5}"
         );
-        // No worse than a half float's step below white, which plans store in.
-        assert!(
-            normal <= depth + 0.0005,
-            "{normal} by normals, {depth} by depth"
-        );
+        // Plans are fitted without slopes, and store in half floats: a step of these below white.
+        let at_most = if planned { depth + 0.0005 } else { 1.1 * depth };
+        assert!(normal <= at_most, "{normal} by normals, {depth} by depth");
     }
 }
 

@@ -26,12 +26,13 @@ const REACH_MM: f64 = 9.6;
 /// All of them; `quick` makes frames smaller and sequences shorter.
 pub fn all(quick: bool) -> Vec<Case> {
     [
+        // First, while the process has had little memory, since some of them look at its peak.
+        files::cases(quick),
         screen::cases(quick),
         texture::cases(quick),
         time::cases(quick),
         numbers::cases(quick),
         hosts::cases(quick),
-        files::cases(quick),
     ]
     .into_iter()
     .flatten()
