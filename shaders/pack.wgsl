@@ -5,13 +5,14 @@
 @group(0) @binding(6) var profile_id: texture_2d<u32>;
 @group(0) @binding(13) var<uniform> normals: Normals;
 @group(0) @binding(14) var normal: texture_2d<f32>;
-// Of each tile, a bit for each level at which it is not flat.
-@group(0) @binding(11) var<storage, read_write> bends: array<atomic<u32>>;
+// Of each tile, as in tiles.wgsl: a bit for each level at which it is not flat, from BENT_SHIFT on.
+@group(0) @binding(11) var<storage, read_write> marked: array<atomic<u32>>;
 
 // Second differences of depth, over the mm of a pixel, up to which a level is flat.
 const FLAT = 0.4;
 // Levels that may have flat tiles; as in tiles.wgsl.
 const FLAT_LEVELS = 3u;
+const BENT_SHIFT = 11u;
 
 fn depth_at(pixel: vec2i) -> f32 {
     return textureLoad(depth, vec2i(view.first_pixel) + pixel, 0).r;
@@ -73,7 +74,8 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
         let flat_levels = select(0u, u32(max(ceil(log2(FLAT / bend)), 0.0)), is_light);
         let columns = (u32(size.x) + TILE - 1u) / TILE;
         let tile = vec2u(pixel) / TILE;
-        atomicOr(&bends[tile.y * columns + tile.x], (1u << FLAT_LEVELS) - (1u << flat_levels));
+        let bends = (1u << FLAT_LEVELS) - (1u << flat_levels);
+        atomicOr(&marked[tile.y * columns + tile.x], bends << BENT_SHIFT);
     }
     var shape = Shape(id, z, vec2f(tangent(east, west, mm.x), tangent(south, north, mm.y)));
     if normals.has != 0u {

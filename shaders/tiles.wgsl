@@ -21,80 +21,71 @@ struct View {
 const TILE = 8u;
 // Levels that may have flat tiles.
 const FLAT_LEVELS = 3u;
+// Columns of pixels that a workgroup marks the tiles of.
+const COLUMNS = 64u;
 // How far from even slopes may be, as sines.
 const EVEN = 0.1;
 const ROWS_PER_OCTAVE = 6.0;
 
-// What is known of a tile: 1 + the highest level it needs, or 0 without skin; whether it holds anything
-// else, too; and its profile.
-const TOP = 0xfu;
-const ELSE = 0x10u;
-const ID_SHIFT = 16u;
+// What is known of a tile, a bit each, so that several together are those of all of them: each level
+// that light is needed of; each level at which the surface is bent; whether there is anything but
+// skin; each profile.
+const LEVELS = 0x7ffu;
+const BENT_SHIFT = 11u;
+const ELSE = 0x4000u;
+const PROFILES = 0xffff0000u;
+const PROFILE_SHIFT = 16u;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var depth: texture_2d<f32>;
 @group(0) @binding(2) var profile_id: texture_2d<u32>;
 // The weights of the plan; the first vector of a row has the highest level in w.
 @group(0) @binding(3) var<storage, read> weights: array<vec4f>;
-@group(0) @binding(4) var<storage, read_write> marked: array<u32>;
+@group(0) @binding(4) var<storage, read_write> marked: array<atomic<u32>>;
 
-var<workgroup> top: atomic<u32>;
-var<workgroup> largest_id: atomic<u32>;
-var<workgroup> elsewhere: atomic<u32>;
-
-// One workgroup a tile.
-@compute @workgroup_size(TILE, TILE)
-fn mark(
-    @builtin(global_invocation_id) at: vec3u,
-    @builtin(local_invocation_id) inside: vec3u,
-    @builtin(local_invocation_index) local: u32,
-    @builtin(workgroup_id) tile: vec3u,
-    @builtin(num_workgroups) tiles: vec3u,
-) {
-    var id = 0u;
-    let pixel = view.first_pixel + at.xy;
-    if all(at.xy < view.size) {
-        id = 1u;
-        if view.has_id != 0u {
-            id = textureLoad(profile_id, pixel, 0).r;
-        }
-        if id > view.profiles {
-            id = 0u;
-        }
+fn marks_of_pixel(pixel_of_view: vec2u) -> u32 {
+    let pixel = view.first_pixel + pixel_of_view;
+    var id = 1u;
+    if view.has_id != 0u {
+        id = textureLoad(profile_id, pixel, 0).r;
     }
-    if id > 0u {
-        let d = textureLoad(depth, pixel, 0).r;
-        let z = (view.depth_to_mm.x * d + view.depth_to_mm.y)
-            / (view.depth_to_mm.z * d + view.depth_to_mm.w);
-        // Infinitely far away there is no surface.
-        if !(abs(z) < 3e38) || d == view.far {
-            id = 0u;
+    if id == 0u || id > view.profiles {
+        return ELSE;
+    }
+    let d = textureLoad(depth, pixel, 0).r;
+    let z = (view.depth_to_mm.x * d + view.depth_to_mm.y)
+        / (view.depth_to_mm.z * d + view.depth_to_mm.w);
+    // Infinitely far away there is no surface.
+    if !(abs(z) < 3e38) || d == view.far {
+        return ELSE;
+    }
+    let mm = abs(view.step.xy * z + view.step.zw);
+    // A slope is blurred at finer levels than a surface that faces the camera; what is narrower
+    // across a ray, or in a pixel that is not square, by less than two rows at coarser ones.
+    let row = ceil((-log2(max(mm.x, mm.y)) - view.first_octave) * ROWS_PER_OCTAVE) + 2.0;
+    let i = u32(clamp(row, 0.0, f32(view.rows - 1u)));
+    let highest = u32(weights[((id - 1u) * view.rows + i) * view.stride].w);
+    return 1u << highest | 1u << (PROFILE_SHIFT + id - 1u);
+}
+
+// One thread a column of a tile.
+@compute @workgroup_size(COLUMNS)
+fn mark(@builtin(global_invocation_id) at: vec3u) {
+    let tiles = (view.size.x + TILE - 1u) / TILE;
+    let tile = vec2u(at.x / TILE, at.y);
+    if tile.x >= tiles {
+        return;
+    }
+    var marks = 0u;
+    for (var y = 0u; y < TILE; y++) {
+        let pixel = vec2u(at.x, at.y * TILE + y);
+        if all(pixel < view.size) {
+            marks |= marks_of_pixel(pixel);
         } else {
-            let mm = abs(view.step.xy * z + view.step.zw);
-            // A slope is blurred at finer levels than a surface that faces the camera; what is narrower
-            // across a ray, or in a pixel that is not square, by less than two rows at coarser ones.
-            let row = ceil((-log2(max(mm.x, mm.y)) - view.first_octave) * ROWS_PER_OCTAVE) + 2.0;
-            let i = u32(clamp(row, 0.0, f32(view.rows - 1u)));
-            // Most pixels of a tile say the same, and a load is cheaper.
-            let needs = 1u + u32(weights[((id - 1u) * view.rows + i) * view.stride].w);
-            if needs > atomicLoad(&top) {
-                atomicMax(&top, needs);
-            }
-            if id > atomicLoad(&largest_id) {
-                atomicMax(&largest_id, id);
-            }
+            marks |= ELSE;
         }
     }
-    workgroupBarrier();
-    let of_tile = atomicLoad(&largest_id);
-    if id != of_tile {
-        atomicStore(&elsewhere, ELSE);
-    }
-    workgroupBarrier();
-    if local == 0u {
-        let skin = of_tile << ID_SHIFT | atomicLoad(&elsewhere) | atomicLoad(&top);
-        marked[tile.y * tiles.x + tile.x] = select(ELSE, skin, of_tile > 0u);
-    }
+    atomicOr(&marked[tile.y * tiles + tile.x], marks);
 }
 
 struct Level {
@@ -118,47 +109,23 @@ struct Draw {
 @group(0) @binding(8) var<storage, read_write> draws: array<Draw, 2>;
 // Tiles to be drawn, x in the low half: the simple ones from the front on, the others from the end.
 @group(0) @binding(9) var<storage, read_write> list: array<u32>;
-// Of each tile of this level and of the one below, a bit for each level at which it is bent.
-@group(0) @binding(10) var<storage, read> bends_below: array<u32>;
-@group(0) @binding(11) var<storage, read_write> bends: array<u32>;
-
 // Where the frame's surface is, as in surface.wgsl.
-@group(0) @binding(12) var shape: texture_2d<u32>;
+@group(0) @binding(10) var shape: texture_2d<u32>;
 
-struct Tile {
-    marks: u32,
-    bends: u32,
-}
-
-fn tile_below(tile: vec2i) -> Tile {
+fn marks_below(tile: vec2i) -> u32 {
     if any(tile < vec2i(0)) || any(tile >= vec2i(level.below)) {
-        return Tile(ELSE, 0u);
+        return ELSE;
     }
-    let i = u32(tile.y) * level.below.x + u32(tile.x);
-    return Tile(below[i], bends_below[i]);
+    return below[u32(tile.y) * level.below.x + u32(tile.x)];
 }
 
-// A tile of this level: as it was marked, or what its four children are together.
-fn tile_at(tile: vec2i) -> Tile {
+// Of a tile of this level: what was marked, or what its four children have together.
+fn marks_of(tile: vec2i) -> u32 {
     if level.level == 0u {
-        return tile_below(tile);
+        return marks_below(tile);
     }
-    var all = Tile(0u, 0u);
-    var highest = 0u;
-    var id = 0u;
-    for (var i = 0; i < 4; i++) {
-        let child = tile_below(2 * tile + vec2i(i & 1, i >> 1u));
-        all.bends |= child.bends;
-        all.marks |= child.marks & ELSE;
-        highest = max(highest, child.marks & TOP);
-        let child_id = child.marks >> ID_SHIFT;
-        if child_id != 0u && id != 0u && child_id != id {
-            all.marks |= ELSE;
-        }
-        id = max(id, child_id);
-    }
-    all.marks |= id << ID_SHIFT | highest;
-    return all;
+    return marks_below(2 * tile) | marks_below(2 * tile + vec2i(1, 0))
+        | marks_below(2 * tile + vec2i(0, 1)) | marks_below(2 * tile + 1);
 }
 
 // The sines of the slopes of the surface, along a row and along a column.
@@ -192,26 +159,21 @@ fn gather(@builtin(global_invocation_id) at: vec3u) {
     if any(at.xy >= level.tiles) {
         return;
     }
-    let middle = tile_at(vec2i(at.xy));
-    var bent = 0u;
-    var simple = level.level < FLAT_LEVELS;
-    var top = 0u;
-    for (var y = -1; y <= 1; y++) {
-        for (var x = -1; x <= 1; x++) {
-            let tile = tile_at(vec2i(at.xy) + vec2i(x, y));
-            top = max(top, tile.marks & TOP);
-            bent |= tile.bends;
-            simple &= (tile.marks & ELSE) == 0u && tile.marks >> ID_SHIFT == middle.marks >> ID_SHIFT;
-        }
-    }
-    let i = at.y * level.tiles.x + at.x;
-    here[i] = middle.marks;
-    bends[i] = middle.bends;
-    if top <= level.level || (middle.marks & TOP) == 0u {
+    let middle = marks_of(vec2i(at.xy));
+    here[at.y * level.tiles.x + at.x] = middle;
+    if (middle & PROFILES) == 0u {
         return;
     }
+    var around = 0u;
+    for (var i = 0; i < 9; i++) {
+        around |= marks_of(vec2i(at.xy) + vec2i(i % 3, i / 3) - 1);
+    }
+    if (around & LEVELS) >> level.level == 0u {
+        return;
+    }
+    let is_flat = level.level < FLAT_LEVELS && (around & (ELSE | 1u << (BENT_SHIFT + level.level))) == 0u;
     let tile = at.y << 16u | at.x;
-    if simple && (bent >> level.level & 1u) == 0u && turns_evenly(vec2i(at.xy)) {
+    if is_flat && countOneBits(around & PROFILES) == 1u && turns_evenly(vec2i(at.xy)) {
         list[atomicAdd(&draws[0].instances, 1u)] = tile;
     } else {
         list[arrayLength(&list) - 1u - atomicAdd(&draws[1].instances, 1u)] = tile;

@@ -33,7 +33,7 @@ impl PlannedScreenSpace {
     ///
     /// # Errors
     /// A format that cannot be rendered to, or blended, on this device; a device that allows fewer than
-    /// 6 storage buffers a stage or 64 threads a workgroup, less than WebGPU's default limits.
+    /// 4 storage buffers a stage or 64 threads a workgroup, less than WebGPU's default limits.
     pub fn new(device: &Device, output: impl Into<Output>) -> Result<Self, Error> {
         let output = output.into();
         crate::input::check_output(device, output)?;
@@ -42,11 +42,11 @@ impl PlannedScreenSpace {
             limits.max_storage_buffers_per_shader_stage,
             limits.max_compute_invocations_per_workgroup,
         );
-        if buffers < 6 || threads < 64 {
+        if buffers < 4 || threads < 64 {
             return Err(Error::new(
                 "device: limits",
                 format!("{buffers} storage buffers a stage, {threads} threads a workgroup"),
-                "6 and 64; WebGPU's defaults are 8 and 256",
+                "4 and 64; WebGPU's defaults are 8 and 256",
             ));
         }
         Ok(Self {

@@ -17,7 +17,7 @@ const ROWS_BEYOND: f32 = 2.0;
 /// Levels that weights are fitted for: at the last, a pixel is 256 of the frame's.
 const FITTED_LEVELS: usize = 8;
 /// Levels that weights may be for.
-const MAX_LEVELS: usize = 10;
+pub(crate) const MAX_LEVELS: usize = 10;
 
 /// The weights of the blurs of a pyramid.
 #[derive(Clone, Debug, PartialEq)]

@@ -14,7 +14,7 @@ use crate::gaussian_sum::{begin, filled, scratch_view};
 use crate::plan::Weights;
 use crate::{Output, ScreenFrame};
 use passes::{Compute, Draw, LIGHT, Passes, Shaders};
-use scratch::{DRAW_BYTES, LevelScratch, Scratch, View};
+use scratch::{COLUMNS, DRAW_BYTES, LevelScratch, Scratch, View};
 
 /// What a frame hands over, already checked.
 pub(crate) struct Inputs<'a> {
@@ -169,14 +169,13 @@ impl Pyramid {
         for level in &scratch.levels {
             forget_tiles(encoder, level);
         }
-        encoder.clear_buffer(&scratch.bends, 0, None);
+        encoder.clear_buffer(&scratch.marked, 0, None);
         let label = "subsurface tiles";
         {
             let mut pass = begin_compute(encoder, label);
-            let [x, y] = base.tiles;
             pass.set_pipeline(&passes.mark.pipeline);
             pass.set_bind_group(0, &frame.mark, &[]);
-            pass.dispatch_workgroups(x, y, 1);
+            pass.dispatch_workgroups(base.size[0].div_ceil(COLUMNS), base.tiles[1], 1);
             // All of the frame's; which of them are simple shows when they are packed.
             gather(&mut pass, &passes.gather, &frame.gather[0], base);
         }
@@ -342,19 +341,17 @@ impl Frame {
             group(&draw.layout, &entries)
         };
         let gather = |l: usize| {
-            let (marked, bends) = match l {
-                0 => (&scratch.marked, &scratch.bends),
-                _ => (&levels[l - 1].marked, &levels[l - 1].bends),
+            let below = match l {
+                0 => &scratch.marked,
+                _ => &levels[l - 1].marked,
             };
             let entries = [
                 (5, levels[l].gathering.as_entire_binding()),
-                (6, marked.as_entire_binding()),
+                (6, below.as_entire_binding()),
                 (7, levels[l].marked.as_entire_binding()),
                 (8, levels[l].draws.as_entire_binding()),
                 (9, levels[l].list.as_entire_binding()),
-                (10, bends.as_entire_binding()),
-                (11, levels[l].bends.as_entire_binding()),
-                (12, Texture(&base.shape)),
+                (10, Texture(&base.shape)),
             ];
             group(&passes.gather.layout, &entries)
         };
@@ -391,7 +388,7 @@ impl Frame {
                     (4, Texture(irradiance)),
                     (5, Texture(depth)),
                     (6, Texture(profile_id)),
-                    (11, scratch.bends.as_entire_binding()),
+                    (11, scratch.marked.as_entire_binding()),
                     (13, scratch.normals.as_entire_binding()),
                     (14, Texture(normal)),
                 ],

@@ -113,7 +113,7 @@ impl Passes {
         let surface = [Some(LIGHT.into()), Some(SHAPE.into())];
         Self {
             mark: compute("mark", &[0, 1, 2, 3, 4]),
-            gather: compute("gather", &[5, 6, 7, 8, 9, 10, 11, 12]),
+            gather: compute("gather", &[5, 6, 7, 8, 9, 10]),
             pack: both(&|careful| {
                 Draw::new(
                     device,
@@ -198,8 +198,8 @@ fn tiles_entry(binding: u32) -> wgpu::BindGroupLayoutEntry {
     match binding {
         0 | 5 => buffer_entry(binding, at, BufferBindingType::Uniform),
         1 => texture_entry(binding, at, FLOAT),
-        2 | 12 => texture_entry(binding, at, TextureSampleType::Uint),
-        3 | 6 | 10 => buffer_entry(binding, at, READ),
+        2 | 10 => texture_entry(binding, at, TextureSampleType::Uint),
+        3 | 6 => buffer_entry(binding, at, READ),
         _ => buffer_entry(binding, at, WRITE),
     }
 }

@@ -11,6 +11,8 @@ use crate::plan::{Shape, Weights, own_blur};
 
 /// Side of a tile, in pixels of its level.
 pub(super) const TILE: u32 = 8;
+/// Columns of pixels that a workgroup marks the tiles of.
+pub(super) const COLUMNS: u32 = 64;
 
 /// `View` of the shaders.
 #[repr(C)]
@@ -73,9 +75,8 @@ pub(super) struct Scratch {
     pub size: [u32; 2],
     pub view: Buffer,
     pub normals: Buffer,
-    /// Of the frame's tiles, what they hold and where they bend.
+    /// What the frame's tiles hold, and where they bend.
     pub marked: Buffer,
-    pub bends: Buffer,
     pub levels: Vec<LevelScratch>,
     /// Means of level 1 and of level 2, and by turns of those above.
     pub means: [TextureView; 2],
@@ -89,7 +90,6 @@ pub(super) struct LevelScratch {
     pub light: TextureView,
     pub shape: TextureView,
     pub marked: Buffer,
-    pub bends: Buffer,
     pub list: Buffer,
     pub draws: Buffer,
 }
@@ -134,7 +134,6 @@ impl Scratch {
                     light: scratch_view(device, "subsurface light", size, LIGHT),
                     shape: scratch_view(device, "subsurface shape", size, SHAPE),
                     marked: words("subsurface marks", count, BufferUsages::empty()),
-                    bends: words("subsurface bends", count, BufferUsages::empty()),
                     list: words("subsurface tiles", count, BufferUsages::empty()),
                     draws: words(
                         "subsurface draws",
@@ -162,8 +161,7 @@ impl Scratch {
             size,
             view: uniform("subsurface view", size_of::<View>()),
             normals: uniform("subsurface normals", size_of::<NormalSettings>()),
-            marked: words("subsurface marks", frame_tiles, BufferUsages::empty()),
-            bends: words("subsurface bends", frame_tiles, BufferUsages::COPY_DST),
+            marked: words("subsurface marks", frame_tiles, BufferUsages::COPY_DST),
             levels,
             means: [mean(1), mean(2)],
         }
@@ -217,8 +215,12 @@ mod tests {
             assert!(shader.contains(&format!("const TILE = {TILE}u;")));
             assert!(shader.contains(&format!("const ROWS_PER_OCTAVE = {rows:.1};")));
         }
-        let shared = "const FLAT_LEVELS = 3u;";
-        assert!(TILES.contains(shared) && PACK.contains(shared));
+        for shared in ["const FLAT_LEVELS = 3u;", "const BENT_SHIFT = 11u;"] {
+            assert!(TILES.contains(shared) && PACK.contains(shared));
+        }
+        assert!(TILES.contains(&format!("const COLUMNS = {COLUMNS}u;")));
+        // A bit for each of a tile's marks.
+        assert_eq!([crate::plan::MAX_LEVELS, crate::MAX_PROFILES], [10, 16]);
     }
 
     #[test]
