@@ -138,7 +138,7 @@ struct Blurs {
 fn blurs_at(plane: Plane, scale: Scale, lattice: Lattice) -> Blurs {
     var blurs = Blurs();
     for (var j = 0u; j < 4u; j++) {
-        if j < BLURS || SQUARE && j == 3u {
+        if j < BLURS || (SQUARE && j == 3u) {
             let k = exponents(level.blurs[j], plane, scale.mm2, lattice);
             blurs.kii[j] = k.x;
             blurs.kij[j] = k.y;

@@ -164,7 +164,7 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
     center.last = vec2i(textureDimensions(here_light)) - 1;
     center.blurs = blurs_at(plane, scale, scale.lattice);
     for (var j = 0u; j < 4u; j++) {
-        if j < BLURS || SQUARE && j == 3u {
+        if j < BLURS || (SQUARE && j == 3u) {
             let blur = level.blurs[j];
             let told = 1.0 - blur.own / blur.variance;
             center.untold[j] = 1.0 / (told * told) - 1.0;

@@ -99,7 +99,8 @@ fn point_or_none(pixel: vec2i) -> Point {
 }
 
 // ∂p/∂x of the surface through `here` for a step of one pixel, in mm: the mean of both sides where
-// they agree, the shorter where one of them jumps to another layer, zero where there is none.
+// they agree; else of the shorter one, as it bends towards `here`, since the other jumps to another
+// layer; zero where there is none.
 fn tangent(pixel: vec2i, step: vec2i, here: Point) -> vec3f {
     let next = point_or_none(pixel + step);
     let last = point_or_none(pixel - step);
@@ -107,19 +108,31 @@ fn tangent(pixel: vec2i, step: vec2i, here: Point) -> vec3f {
     let backward = here.mm - last.mm;
     let has_forward = next.profile == here.profile;
     let has_backward = last.profile == here.profile;
-    if has_forward && has_backward {
-        let f = dot(forward, forward);
-        let b = dot(backward, backward);
-        // A factor of two in length is more than a smooth surface changes in a pixel.
-        if max(f, b) <= 4.0 * min(f, b) {
-            return 0.5 * (forward + backward);
-        }
-        return select(backward, forward, f < b);
+    let f = dot(forward, forward);
+    let b = dot(backward, backward);
+    // A factor of two in length is more than a smooth surface changes in a pixel.
+    if has_forward && has_backward && max(f, b) <= 4.0 * min(f, b) {
+        return 0.5 * (forward + backward);
     }
-    if has_forward {
-        return forward;
+    if has_forward && (!has_backward || f < b) {
+        return one_sided(forward, point_or_none(pixel + 2 * step), next);
     }
-    return select(vec3f(0.0), backward, has_backward);
+    if has_backward {
+        return -one_sided(-backward, point_or_none(pixel - 2 * step), last);
+    }
+    return vec3f(0.0);
+}
+
+// The step at `here` from those to the next point and on to the one beyond: as they bend on, the less the
+// more they differ.
+fn one_sided(first: vec3f, beyond: Point, next: Point) -> vec3f {
+    let second = beyond.mm - next.mm;
+    let bend = first - second;
+    let least = min(dot(first, first), dot(second, second));
+    let share = saturate(1.2 * (1.0 - dot(bend, bend) / least));
+    // Of another layer it may be no number.
+    let is_same = beyond.profile == next.profile && dot(bend, bend) < least;
+    return select(first, first + 0.5 * share * bend, is_same);
 }
 
 // The pixel's frame on the surface: M = JᵀJ with J = (∂p/∂x ∂p/∂y), as area √det M in mm², the

@@ -13,6 +13,8 @@ const FLAT = 0.4;
 // Levels that may have flat tiles; as in tiles.wgsl.
 const FLAT_LEVELS = 3u;
 const BENT_SHIFT = 11u;
+// ∂z over the mm of a pixel that a surface may have.
+const STEEPEST = 40.0;
 
 fn depth_at(pixel: vec2i) -> f32 {
     return textureLoad(depth, vec2i(view.first_pixel) + pixel, 0).r;
@@ -24,16 +26,38 @@ fn z_at(pixel: vec2i) -> f32 {
     return (c.x * d + c.y) / (c.z * d + c.w);
 }
 
-// ∂z over the mm of a pixel: the mean of both sides where they agree, the shorter where one jumps.
-fn tangent(forward: f32, backward: f32, mm: f32) -> f32 {
-    let f = forward * forward + mm * mm;
-    let b = backward * backward + mm * mm;
+fn is_inside(pixel: vec2i) -> bool {
+    return all(pixel >= vec2i(0)) && all(pixel < vec2i(view.size));
+}
+
+// ∂z over the mm of a pixel, from the steps from its neighbour and to the one on the other side: the mean
+// where they agree; else of the shorter one, as it bends towards the pixel, since the other jumps.
+// Beyond the frame nothing is known. Follows `tangent` of gaussian_sum.wgsl.
+fn tangent(pixel: vec2i, step: vec2i, sides: vec2f, mm: f32) -> f32 {
+    let lengths2 = sides * sides + mm * mm;
+    let has_last = is_inside(pixel - step);
+    let has_next = is_inside(pixel + step);
     // A factor of two in length is more than a smooth surface changes in a pixel.
-    let mean = max(f, b) <= 4.0 * min(f, b);
-    let shorter = select(backward, forward, f < b);
-    let dz = select(shorter, 0.5 * (forward + backward), mean);
+    if has_last && has_next && max(lengths2.x, lengths2.y) <= 4.0 * min(lengths2.x, lengths2.y) {
+        return 0.5 * (sides.x + sides.y) / mm;
+    }
+    let is_forward = has_next && (!has_last || lengths2.y < lengths2.x);
+    let way = select(-step, step, is_forward);
+    let first = select(-sides.x, sides.y, is_forward);
     // What jumps on both sides faces the camera for all that is known.
-    return select(0.0, dz / mm, abs(dz) < 40.0 * mm);
+    if !(abs(first) < STEEPEST * mm) {
+        return 0.0;
+    }
+    var dz = first;
+    if is_inside(pixel + 2 * way) {
+        let second = z_at(pixel + 2 * way) - z_at(pixel + way);
+        let bend = first - second;
+        let least = min(first * first, second * second) + mm * mm;
+        let share = saturate(1.2 * (1.0 - bend * bend / least));
+        // On another layer it may be no number.
+        dz = select(first, first + 0.5 * share * bend, bend * bend < least);
+    }
+    return select(-dz, dz, is_forward) / mm;
 }
 
 @fragment
@@ -77,7 +101,9 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
         let bends = (1u << FLAT_LEVELS) - (1u << flat_levels);
         atomicOr(&marked[tile.y * columns + tile.x], bends << BENT_SHIFT);
     }
-    var shape = Shape(id, z, vec2f(tangent(east, west, mm.x), tangent(south, north, mm.y)));
+    var shape = Shape(id, z, vec2f(0.0));
+    shape.tangent.x = tangent(pixel, vec2i(1, 0), vec2f(west, east), mm.x);
+    shape.tangent.y = tangent(pixel, vec2i(0, 1), vec2f(north, south), mm.y);
     if normals.has != 0u {
         let texel = textureLoad(normal, pixel_of_host, 0).xyz;
         let signed_mm = view.step.xy * z + view.step.zw;

@@ -117,7 +117,7 @@ fn half_floats(v: vec4f) -> vec4f {
 // Slopes are kept as sines.
 fn packed(id: u32, z: f32, sines: vec2f) -> vec2u {
     let steps = vec2u(clamp(sines * 2047.0 + 2048.5, vec2f(0.0), vec2f(4095.0)));
-    return vec2u(id << 24u | steps.y << 12u | steps.x, bitcast<u32>(z));
+    return vec2u((id << 24u) | (steps.y << 12u) | steps.x, bitcast<u32>(z));
 }
 
 fn sines_of(shape: vec2u) -> vec2f {

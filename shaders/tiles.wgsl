@@ -30,11 +30,11 @@ const ROWS_PER_OCTAVE = 6.0;
 // What is known of a tile, a bit each, so that several together are those of all of them: each level
 // that light is needed of; each level at which the surface is bent; whether there is anything but
 // skin; each profile.
-const LEVELS = 0x7ffu;
 const BENT_SHIFT = 11u;
-const ELSE = 0x4000u;
-const PROFILES = 0xffff0000u;
+const LEVELS = (1u << BENT_SHIFT) - 1u;
+const ELSE = 1u << (BENT_SHIFT + FLAT_LEVELS);
 const PROFILE_SHIFT = 16u;
+const PROFILES = 0xffffu << PROFILE_SHIFT;
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var depth: texture_2d<f32>;
@@ -65,7 +65,7 @@ fn marks_of_pixel(pixel_of_view: vec2u) -> u32 {
     let row = ceil((-log2(max(mm.x, mm.y)) - view.first_octave) * ROWS_PER_OCTAVE) + 2.0;
     let i = u32(clamp(row, 0.0, f32(view.rows - 1u)));
     let highest = u32(weights[((id - 1u) * view.rows + i) * view.stride].w);
-    return 1u << highest | 1u << (PROFILE_SHIFT + id - 1u);
+    return (1u << highest) | (1u << (PROFILE_SHIFT + id - 1u));
 }
 
 // One thread a column of a tile.
@@ -171,8 +171,8 @@ fn gather(@builtin(global_invocation_id) at: vec3u) {
     if (around & LEVELS) >> level.level == 0u {
         return;
     }
-    let is_flat = level.level < FLAT_LEVELS && (around & (ELSE | 1u << (BENT_SHIFT + level.level))) == 0u;
-    let tile = at.y << 16u | at.x;
+    let is_flat = level.level < FLAT_LEVELS && (around & (ELSE | (1u << (BENT_SHIFT + level.level)))) == 0u;
+    let tile = (at.y << 16u) | at.x;
     if is_flat && countOneBits(around & PROFILES) == 1u && turns_evenly(vec2i(at.xy)) {
         list[atomicAdd(&draws[0].instances, 1u)] = tile;
     } else {

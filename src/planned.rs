@@ -40,7 +40,9 @@ impl PlannedScreenSpace {
         let limits = device.limits();
         let (buffers, threads) = (
             limits.max_storage_buffers_per_shader_stage,
-            limits.max_compute_invocations_per_workgroup,
+            limits
+                .max_compute_invocations_per_workgroup
+                .min(limits.max_compute_workgroup_size_x),
         );
         if buffers < 4 || threads < 64 {
             return Err(Error::new(

@@ -10,6 +10,7 @@ use subsurface::wgpu::{TextureFormat, TextureView};
 use subsurface::{Error, PlannedScreenSpace, Profile, ScreenSpace, TextureSpace};
 
 use crate::clock;
+use crate::costs;
 use crate::heads::{self, HEADS, Textured, time_atlas};
 use crate::method::{AtlasMethod, Planned, ScreenMethod};
 use crate::options::{Options, Plan};
@@ -129,17 +130,16 @@ impl<'a> Lab<'a> {
         Ok(done)
     }
 
-    /// Every method in screen space; the median time of the copy.
-    fn screen(&self, scene: &Scene, score: &Score, done: &mut Done) -> Result<f64, Error> {
-        let gpu = &self.gpu;
-        let mut images = images_of(&scene.name, score, Knows::Frame);
-        let mut methods = rivals::screen(&gpu.device, OUTPUT, &Profile::SKIN)?;
-        let exact = ScreenSpace::new(&gpu.device, OUTPUT)?;
+    /// Those in screen space that are wanted, the copy first.
+    fn screen_methods(&self) -> Result<Vec<rivals::Screen>, Error> {
+        let device = &self.gpu.device;
+        let mut methods = rivals::screen(device, OUTPUT, &Profile::SKIN)?;
+        let exact = ScreenSpace::new(device, OUTPUT)?;
         methods.insert(1, ("screen_exact", String::new(), Box::new(exact)));
         for (i, (setting, plan)) in self.plans.iter().enumerate() {
             let planned = Planned {
-                effect: PlannedScreenSpace::new(&gpu.device, OUTPUT)?,
-                queue: gpu.queue.clone(),
+                effect: PlannedScreenSpace::new(device, OUTPUT)?,
+                queue: self.gpu.queue.clone(),
                 plan: plan.clone(),
             };
             methods.insert(
@@ -148,6 +148,14 @@ impl<'a> Lab<'a> {
             );
         }
         methods.retain(|(name, ..)| self.wanted(name));
+        Ok(methods)
+    }
+
+    /// Every method in screen space; the median time of the copy.
+    fn screen(&self, scene: &Scene, score: &Score, done: &mut Done) -> Result<f64, Error> {
+        let gpu = &self.gpu;
+        let mut images = images_of(&scene.name, score, Knows::Frame);
+        let mut methods = self.screen_methods()?;
         self.begin(format!("{}: warming up", scene.name), methods.len());
         let output = gpu.target("scattered", scene.size, OUTPUT);
         let frame = scene.frame(&output);
@@ -201,13 +209,8 @@ impl<'a> Lab<'a> {
                 );
             }
             done.rows.push(row);
-            done.intervals.push(Interval {
-                scene: scene.name.clone(),
-                method: (*name).into(),
-                setting: setting.clone(),
-                runs: times[i].len(),
-                interval_95,
-            });
+            done.intervals
+                .push(interval(scene, name, setting, times[i].len(), interval_95));
         }
         done.keep_images(&images)?;
         Ok(clock::median(&times[0]))
@@ -287,6 +290,63 @@ impl<'a> Lab<'a> {
         done.keep_images(&images)
     }
 
+    /// What a pixel of skin costs, by the methods that are compared by their times.
+    ///
+    /// # Errors
+    /// A model without skin in view; a size that cannot be rendered, or scattered by a method.
+    pub fn costs(&self) -> Result<Done, Error> {
+        let Self { gpu, model, .. } = self;
+        let Plan { size, rounds, .. } = self.plan;
+        self.begin("costs: warming up".into(), costs::SCENES.len());
+        let scenes = costs::scenes(gpu, model, self.options.mm_per_unit, size)?;
+        let mut methods = Vec::new();
+        for scene in &scenes {
+            let output = gpu.target("scattered", size, OUTPUT);
+            // A method keeps one frame.
+            let mut of_scene = self.screen_methods()?;
+            // The exact effect, whose cost grows with the kernel, would take most of the time.
+            of_scene.retain(|(name, setting, _)| {
+                *name != "screen_exact" && COMPARED.contains(&(*name, setting.as_str()))
+            });
+            for (.., method) in &mut of_scene {
+                method.prepare(&gpu.device, &scene.frame(&output))?;
+                gpu.run(|encoder| method.render(encoder));
+            }
+            methods.push(of_scene);
+            self.bar.inc(1);
+        }
+        let all = methods.iter().flatten();
+        let timed: Vec<(&dyn ScreenMethod, bool)> =
+            all.map(|(.., method)| (method.as_ref(), true)).collect();
+        self.begin("costs: timing".into(), rounds.compared);
+        let times = clock::rounds(gpu, &timed, rounds, || self.bar.inc(1));
+        let count = methods[0].len();
+        let mut done = Done::default();
+        for (s, scene) in scenes.iter().enumerate() {
+            let copy = &times[s * count];
+            for (m, (name, setting, method)) in methods[s].iter().enumerate() {
+                let times = &times[s * count + m];
+                let (x_copy, interval_95) = clock::ratio(times, copy);
+                done.rows.push(Row {
+                    ms: clock::median(times),
+                    x_copy,
+                    fetches: method.fetches(scene.px_per_mm),
+                    scratch_bytes_per_pixel: Some(method.scratch_bytes_per_pixel()),
+                    ..empty_row(scene, name, setting)
+                });
+                done.intervals
+                    .push(interval(scene, name, setting, times.len(), interval_95));
+            }
+        }
+        for (m, (name, setting, _)) in methods[0].iter().enumerate().skip(1) {
+            let of_method = std::array::from_fn(|s| times[s * count + m].as_slice());
+            let name = format!("{name} {setting}");
+            done.notes
+                .push(costs::note(&name, of_method, &times[0], &scenes));
+        }
+        Ok(done)
+    }
+
     /// Li & Shao's Fig. 8.
     ///
     /// # Errors
@@ -347,6 +407,22 @@ fn images_of(scene: &str, score: &Score, knows: Knows) -> SceneImages {
         scene: scene.into(),
         truth: thumbnail(score.picture(score.truth(knows))),
         entries: Vec::new(),
+    }
+}
+
+fn interval(
+    scene: &Scene,
+    method: &str,
+    setting: &str,
+    runs: usize,
+    interval_95: [f64; 2],
+) -> Interval {
+    Interval {
+        scene: scene.name.clone(),
+        method: method.into(),
+        setting: setting.into(),
+        runs,
+        interval_95,
     }
 }
 

@@ -6,6 +6,7 @@
 //! ```
 
 mod clock;
+mod costs;
 mod files;
 #[cfg(test)]
 mod fixture;
@@ -84,7 +85,7 @@ fn chart(options: &Options) -> Result<(), Error> {
         ));
     }
     let mut scenes = scene::names();
-    scenes.push("heads".into());
+    scenes.extend(["costs".into(), "heads".into()]);
     let scenes = chosen("--scenes", options.scenes.as_ref(), scenes)?;
     chosen(
         "--methods",
@@ -111,10 +112,10 @@ fn chart(options: &Options) -> Result<(), Error> {
         done.push(match progress.read(name) {
             Some(kept) => kept,
             None => {
-                let new = if name == "heads" {
-                    lab.heads()?
-                } else {
-                    lab.scene(name)?
+                let new = match name.as_str() {
+                    "costs" => lab.costs()?,
+                    "heads" => lab.heads()?,
+                    _ => lab.scene(name)?,
                 };
                 progress.keep(name, &new)?;
                 new

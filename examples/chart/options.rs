@@ -12,8 +12,8 @@ against the other.
 
 Usage: cargo run --release --example chart -- [OPTIONS]
 
-  --scenes LIST     of front, three-quarter, close-up, far, profile, sphere, edge_0.5 to edge_64
-                    and heads, separated by commas                      [all]
+  --scenes LIST     of front, three-quarter, close-up, far, profile, sphere, edge_0.5 to edge_64,
+                    costs and heads, separated by commas                [all]
   --methods LIST    such as screen_exact,burley_disk                    [all]
   --size WxH        of the frames, in pixels                            [512x512; quick: 256x256]
   --quick           fewer runs, smaller atlases, truths at every fourth pixel, not every second

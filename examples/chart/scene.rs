@@ -238,6 +238,25 @@ fn sphere(gpu: &Gpu, size: [u32; 2], stride: u32) -> Scene {
     })
 }
 
+/// A plane that faces the camera: where it is skin, and its light.
+pub fn flat(
+    gpu: &Gpu,
+    name: &str,
+    size: [u32; 2],
+    px_per_mm: f64,
+    irradiance: impl Fn(DVec2) -> Option<f64>,
+) -> Scene {
+    orthographic(gpu, name.into(), size, px_per_mm, 1, |at| {
+        Some(Hit {
+            point_mm: at.extend(0.0),
+            normal: DVec3::Z,
+            irradiance: irradiance(at)?,
+            // Nobody asks.
+            scattered: DVec3::NAN,
+        })
+    })
+}
+
 /// A straight edge, soft by σ = 1 px, at 30°, over a whole frame of skin.
 fn edge(gpu: &Gpu, size: [u32; 2], sigma_px: f64, stride: u32) -> Scene {
     let px_per_mm = sigma_px / RED_SIGMA_MM;

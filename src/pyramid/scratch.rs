@@ -215,12 +215,14 @@ mod tests {
             assert!(shader.contains(&format!("const TILE = {TILE}u;")));
             assert!(shader.contains(&format!("const ROWS_PER_OCTAVE = {rows:.1};")));
         }
-        for shared in ["const FLAT_LEVELS = 3u;", "const BENT_SHIFT = 11u;"] {
+        // A bit for the frame and for each level, then for the bends; from the other end for each profile.
+        let bends = format!("const BENT_SHIFT = {}u;", crate::plan::MAX_LEVELS + 1);
+        for shared in ["const FLAT_LEVELS = 3u;", &bends] {
             assert!(TILES.contains(shared) && PACK.contains(shared));
         }
+        let profiles = 32 - crate::MAX_PROFILES;
+        assert!(TILES.contains(&format!("const PROFILE_SHIFT = {profiles}u;")));
         assert!(TILES.contains(&format!("const COLUMNS = {COLUMNS}u;")));
-        // A bit for each of a tile's marks.
-        assert_eq!([crate::plan::MAX_LEVELS, crate::MAX_PROFILES], [10, 16]);
     }
 
     #[test]
