@@ -38,26 +38,25 @@ fn tangent(pixel: vec2i, step: vec2i, sides: vec2f, mm: f32) -> f32 {
     let has_last = is_inside(pixel - step);
     let has_next = is_inside(pixel + step);
     // A factor of two in length is more than a smooth surface changes in a pixel.
-    if has_last && has_next && max(lengths2.x, lengths2.y) <= 4.0 * min(lengths2.x, lengths2.y) {
-        return 0.5 * (sides.x + sides.y) / mm;
-    }
-    let is_forward = has_next && (!has_last || lengths2.y < lengths2.x);
-    let way = select(-step, step, is_forward);
-    let first = select(-sides.x, sides.y, is_forward);
-    // What jumps on both sides faces the camera for all that is known.
-    if !(abs(first) < STEEPEST * mm) {
-        return 0.0;
-    }
-    var dz = first;
-    if is_inside(pixel + 2 * way) {
+    let is_smooth = max(lengths2.x, lengths2.y) <= 4.0 * min(lengths2.x, lengths2.y);
+    var known = 0.5 * (sides.x + sides.y);
+    var dz = known;
+    if !(has_last && has_next && is_smooth) {
+        let is_forward = has_next && (!has_last || lengths2.y < lengths2.x);
+        let way = select(-step, step, is_forward);
+        let first = select(-sides.x, sides.y, is_forward);
         let second = z_at(pixel + 2 * way) - z_at(pixel + way);
         let bend = first - second;
         let least = min(first * first, second * second) + mm * mm;
         let share = saturate(1.2 * (1.0 - bend * bend / least));
         // On another layer it may be no number.
-        dz = select(first, first + 0.5 * share * bend, bend * bend < least);
+        let bends_on = is_inside(pixel + 2 * way) && bend * bend < least;
+        known = first;
+        dz = select(first, first + 0.5 * share * bend, bends_on);
+        dz = select(-dz, dz, is_forward);
     }
-    return select(-dz, dz, is_forward) / mm;
+    // What jumps on both sides, maybe to infinity, faces the camera for all that is known.
+    return select(0.0, clamp(dz / mm, -STEEPEST, STEEPEST), abs(known) < STEEPEST * mm);
 }
 
 @fragment
