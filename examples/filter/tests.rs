@@ -122,11 +122,11 @@ impl Head {
 /// in a float and back may be a place off, here 3e-5 mm, where pixels are .6 mm apart: slopes, by which
 /// areas are weighed, move by 5e-5 between two pixels.
 const APART: f32 = 2e-4;
-/// But for a value in ten thousand: of the effects' thresholds (whether a row is summed anew, whether one side
-/// of a slope jumps) one may be passed by one of the two alone. By the plan one value is .0003 apart,
-/// by the exact effect one .0005; at which threshold was not found.
-const SHARE_BEYOND: f64 = 1e-4;
-const APART_AT_MOST: f32 = 1e-3;
+/// But for a value or two of each effect: since slopes at silhouettes are carried on as they bend, one is .0003
+/// apart by the plan and one .0005 by the exact effect, each at a corner of a silhouette. Why was not found;
+/// it is none of the thresholds from which on the exact effect sums rows anew.
+const BEYOND: usize = 2;
+const APART_AT_MOST: f32 = 6e-4;
 
 #[test]
 fn a_dump_scatters_as_the_frame_did() {
@@ -170,7 +170,7 @@ fn a_dump_scatters_as_the_frame_did() {
              {apart_half:.1e} in half floats"
         );
         assert!(apart < APART_AT_MOST, "{apart}");
-        assert!((beyond as f64) < SHARE_BEYOND * count as f64, "{beyond}");
+        assert!(beyond <= BEYOND, "{beyond} of {count}");
         // One place of a half float: the device may round to either side.
         assert!(apart_half < 1.0 / 1024.0 + APART_AT_MOST, "{apart_half}");
     }
