@@ -6,6 +6,8 @@
 // [LS15] Li & Shao 2015, "GPU-based face rendering via the physical model of light interaction
 //        with human skin", Eq. 7–12. Their Eq. 10 lacks 1/v; the division above makes up for it.
 // [EL07] d'Eon & Luebke 2007, "Advanced techniques for realistic real-time skin rendering".
+// [S1874] E. Selling, "Ueber die binaeren und ternaeren quadratischen Formen", Crelle 77, 1874: reduced forms as
+//        sums of squares along steps of a lattice.
 // docs/method.md tells where this departs from both, and why.
 
 struct Settings {
@@ -44,15 +46,17 @@ struct Settings {
 
 // Beyond 3.5 σ a Gaussian on a plane holds e^(−3.5²/2) = .2 % of its mass.
 const REACH_SIGMAS = 3.5;
-// Up to this reach in pixels a kernel is summed over its square: there a row of taps is too coarse
-// to be sheared, and the square is cheap.
-const SQUARE_REACH = 2;
+// Up to this variance along each of three steps of the lattice, in steps², a kernel is summed over their neighbours:
+// there a row of taps is too coarse to be sheared.
+const SMALL = 0.4;
 // Variance along a row, in px², from which the nearest pixel stands for a sheared tap.
 const WIDE_PX2 = 9.0;
+// How far off a pixel a tap may lie to be that pixel.
+const NEGLIGIBLE_PX = 1.0 / 512.0;
 // How far a row may stray from the tangent plane before it is weighed anew: in squared mm as a
-// share of the squared distance, and of the variance.
-const BEND = 0.35;
-const STRAY = 0.15;
+// share of the squared distance, and of the variance; by a Gaussian of full weight.
+const BEND = 0.03;
+const STRAY = 0.018;
 
 struct Vertex {
     @builtin(position) position: vec4f,
@@ -98,10 +102,16 @@ fn point_or_none(pixel: vec2i) -> Point {
     return point(pixel);
 }
 
-// ∂p/∂x of the surface through `here` for a step of one pixel, in mm: the mean of both sides where
-// they agree; else of the shorter one, as it bends towards `here`, since the other jumps to another
-// layer; zero where there is none.
-fn tangent(pixel: vec2i, step: vec2i, here: Point) -> vec3f {
+struct Tangent {
+    // ∂p/∂x of the surface for a step of one pixel, in mm; zero where there is no surface beside the pixel.
+    mm: vec3f,
+    // From 0 to 1, whether the surface goes on to both sides as a plane does.
+    even: f32,
+}
+
+// The mean of both sides where they agree; else of the shorter one, as it curves towards `here`, since
+// the other jumps to another layer.
+fn tangent(pixel: vec2i, step: vec2i, here: Point) -> Tangent {
     let next = point_or_none(pixel + step);
     let last = point_or_none(pixel - step);
     let forward = next.mm - here.mm;
@@ -112,44 +122,58 @@ fn tangent(pixel: vec2i, step: vec2i, here: Point) -> vec3f {
     let b = dot(backward, backward);
     // A factor of two in length is more than a smooth surface changes in a pixel.
     if has_forward && has_backward && max(f, b) <= 4.0 * min(f, b) {
-        return 0.5 * (forward + backward);
+        let bend = forward - backward;
+        let even = saturate(1.5 - 8.0 * dot(bend, bend) / min(f, b));
+        return Tangent(0.5 * (forward + backward), even);
     }
     if has_forward && (!has_backward || f < b) {
-        return one_sided(forward, point_or_none(pixel + 2 * step), next);
+        return Tangent(one_sided(forward, point_or_none(pixel + 2 * step), next), 0.0);
     }
     if has_backward {
-        return -one_sided(-backward, point_or_none(pixel - 2 * step), last);
+        return Tangent(-one_sided(-backward, point_or_none(pixel - 2 * step), last), 0.0);
     }
-    return vec3f(0.0);
+    return Tangent(vec3f(0.0), 0.0);
 }
 
-// The step at `here` from those to the next point and on to the one beyond: as they bend on, the less the
-// more they differ.
-fn one_sided(first: vec3f, beyond: Point, next: Point) -> vec3f {
-    let second = beyond.mm - next.mm;
-    let bend = first - second;
-    let least = min(dot(first, first), dot(second, second));
-    let share = saturate(1.2 * (1.0 - dot(bend, bend) / least));
-    // Of another layer it may be no number.
-    let is_same = beyond.profile == next.profile && dot(bend, bend) < least;
-    return select(first, first + 0.5 * share * bend, is_same);
+// The step at `here` on the circle through it, the next point and the one beyond; the less the sharper they
+// turn.
+//
+// Tangent to the circle through 0, a and b is a/a² − b/b², of which (b²a − a²b)/(b² − 2a²) goes as far
+// as a step. With b = a + c that is a + a²/(b² − 2a²)(a − c), for a line a + (a − c)/2.
+fn one_sided(a: vec3f, beyond: Point, next: Point) -> vec3f {
+    let c = beyond.mm - next.mm;
+    let a2 = dot(a, a);
+    let b2 = dot(a + c, a + c);
+    // Of 0.7, or 45 degrees, are ridges. Of another layer it may be no number.
+    let turn = dot(a, c) * inverseSqrt(a2 * dot(c, c));
+    let is_same = beyond.profile == next.profile && turn > 0.7;
+    // No more than the last turn once again, since where exactly a rim ends is not known.
+    let share = saturate(5.0 * (turn - 0.7)) * clamp(a2 / max(b2 - 2.0 * a2, 1e-20), 0.0, 1.0);
+    return select(a, a + share * (a - c), is_same);
 }
 
-// The pixel's frame on the surface: M = JᵀJ with J = (∂p/∂x ∂p/∂y), as area √det M in mm², the
-// shear κ = M₀₁/M₀₀, M₀₀, and the mm between pixels along a row and between sheared rows.
+// The pixel's frame on the surface: M = JᵀJ with J = (∂p/∂x ∂p/∂y).
 struct Metric {
+    // √det M, in mm².
     area: f32,
+    // κ = M₀₁/M₀₀.
     shear: f32,
     m00: f32,
-    spacing: vec2f,
+    // The mm between pixels along a row and between sheared rows: of the surface, or of one that faces the
+    // camera where that is shorter.
+    reach: vec2f,
+    // M₀₀, M₀₁ and M₁₁ where the surface is even; where it bends, those of one that faces the camera.
+    lattice: vec3f,
 }
 
 fn metric(pixel: vec2i, here: Point) -> Metric {
     let mm = settings.spacing.xz + settings.spacing.yw * here.mm.z;
     let facing = abs(mm);
     let is_screen = any(settings.spacing != vec4f(0.0));
-    var tx = tangent(pixel, vec2i(1, 0), here);
-    var ty = tangent(pixel, vec2i(0, 1), here);
+    let along = tangent(pixel, vec2i(1, 0), here);
+    let across = tangent(pixel, vec2i(0, 1), here);
+    var tx = along.mm;
+    var ty = across.mm;
     if settings.normals.has != 0u {
         let ray = settings.rays.xy + settings.rays.zw * (vec2f(pixel) + 0.5);
         let texel = textureLoad(normal, vec2i(settings.first_pixel) + pixel, 0).xyz;
@@ -165,12 +189,22 @@ fn metric(pixel: vec2i, here: Point) -> Metric {
         // A strip one pixel wide has no width of its own: it is taken to be as wide as it faces the
         // camera, or as its pixels are long.
         let width = select(vec2f(sqrt(max(xx, yy))), facing, is_screen);
-        let spacing = max(width, vec2f(sqrt(xx), sqrt(yy)));
-        return Metric(spacing.x * spacing.y, 0.0, spacing.x * spacing.x, spacing);
+        let steps = max(width, vec2f(sqrt(xx), sqrt(yy)));
+        let square = steps * steps;
+        return Metric(steps.x * steps.y, 0.0, square.x, steps, vec3f(square.x, 0.0, square.y));
     }
     let area = length(cross(tx, ty));
-    let spacing = select(vec2f(sqrt(xx), area / sqrt(xx)), facing, is_screen);
-    return Metric(area, dot(tx, ty) / xx, xx, spacing);
+    let own = vec3f(xx, dot(tx, ty), yy);
+    let even = select(1.0, along.even * across.even, is_screen);
+    let lattice = mix(vec3f(facing.x * facing.x, 0.0, facing.y * facing.y), own, even);
+    let reach = select(vec2f(sqrt(xx), area / sqrt(xx)), facing, is_screen);
+    return Metric(area, own.y / xx, xx, reach, lattice);
+}
+
+// The mm between pixels along a row and between sheared rows.
+fn spacing(lattice: vec3f) -> vec2f {
+    let along = sqrt(lattice.x);
+    return vec2f(along, sqrt(max(lattice.z - lattice.y * lattice.y / lattice.x, 0.0)));
 }
 
 fn gaussian(here: Point, i: u32) -> vec4f {
@@ -238,10 +272,10 @@ fn fs_rows(vertex: Vertex) -> @location(0) vec4f {
     if here.profile == 0u {
         return vec4f(0.0);
     }
-    let spacing = metric(pixel, here).spacing;
+    let m = metric(pixel, here);
     let v = gaussian(here, vertex.gaussian).w;
-    let reach = reach(spacing, v);
-    return row(pixel, here, reach.x, lattice_variance(v, spacing.x));
+    let reach = reach(m.reach, v);
+    return row(pixel, here, reach.x, lattice_variance(v, spacing(m.lattice).x));
 }
 
 // The pixels of a row around q, as `here` weighs them.
@@ -259,23 +293,64 @@ fn row(q: vec2i, here: Point, reach: i32, variance_mm2: f32) -> vec4f {
     return total;
 }
 
-// A small kernel, over its square; the lattice may be finer along the rows than across.
-fn square(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32) -> vec4f {
-    let along_mm2 = lattice_variance(v, m.spacing.x);
-    let across_mm2 = lattice_variance(v, m.spacing.y);
-    let first = max(pixel - reach, vec2i(0));
-    let last = min(pixel + reach, size() - 1);
+// Three steps of the lattice that add up to nothing, and how much variance lies along each, in steps²:
+// together, Σ ρ e eᵀ, they are a covariance.
+struct Steps {
+    e: array<vec2i, 3>,
+    rho: vec3f,
+}
+
+// Of a covariance, xx, xy and yy in px²: [S1874], by vectors u + v + w = 0 of which no two are at less than a right
+// angle as the covariance measures it.
+fn along_steps(c: vec3f) -> Steps {
+    let covariance = mat2x2f(c.x, c.y, c.y, c.z);
+    var u = vec2f(1.0, 0.0);
+    var v = vec2f(0.0, 1.0);
+    var w = vec2f(-1.0, -1.0);
+    // Twelve are enough up to 85 degrees; where they are not, some ρ is less than 0.
+    for (var i = 0; i < 12; i++) {
+        if dot(u, covariance * v) > 0.0 {
+            w = u - v;
+            u = -u;
+        } else if dot(v, covariance * w) > 0.0 {
+            u = v - w;
+            v = -v;
+        } else if dot(w, covariance * u) > 0.0 {
+            v = w - u;
+            w = -w;
+        } else {
+            break;
+        }
+    }
+    let rho = -vec3f(dot(v, covariance * w), dot(w, covariance * u), dot(u, covariance * v));
+    return Steps(array(across(u), across(v), across(w)), rho);
+}
+
+fn across(v: vec2f) -> vec2i {
+    return vec2i(vec2f(-v.y, v.x));
+}
+
+// A small kernel on any slope: three taps along each of three steps, which pass a wave of 1.1 rad a step as their
+// variance asks. What is off the plane weighs as the plane does at that distance.
+fn small(pixel: vec2i, here: Point, lattice: vec3f, steps: Steps) -> vec4f {
+    // w with 1 − 2w(1 − cos 1.1) = e^(−1.1² ρ/2), as a series since of no variance nothing may be left.
+    let x = 0.605 * steps.rho;
+    let w = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0))) / 1.09280;
+    let exponents = log(max(w / (1.0 - 2.0 * w), vec3f(1e-30)));
+    let last = size() - 1;
     var total = vec4f(0.0);
-    for (var y = first.y; y <= last.y; y++) {
-        for (var x = first.x; x <= last.x; x++) {
-            let q = vec2i(x, y);
+    for (var i = 0; i < 27; i++) {
+        let n = vec3i(i % 3, (i / 3) % 3, i / 9) - 1;
+        let offset = n.x * steps.e[0] + n.y * steps.e[1] + n.z * steps.e[2];
+        let q = pixel + offset;
+        if all(q >= vec2i(0)) && all(q <= last) {
             let there = point(q);
             if there.profile == here.profile {
-                let d2 = distance2(there.mm, here.mm);
-                let delta = f32(x - pixel.x) + m.shear * f32(y - pixel.y);
-                let along2 = min(m.m00 * delta * delta, d2);
-                let w = weight(along2, along_mm2) * weight(d2 - along2, across_mm2);
-                total += w * textureLoad(source, q, 0);
+                let d = vec2f(offset);
+                let plane2 = dot(lattice, vec3f(d.x * d.x, 2.0 * d.x * d.y, d.y * d.y));
+                // In the middle both are 0.
+                let off = select(1.0, distance2(there.mm, here.mm) / plane2, any(offset != vec2i(0)));
+                total += exp(dot(vec3f(abs(n)), exponents) * off) * textureLoad(source, q, 0);
             }
         }
     }
@@ -293,6 +368,8 @@ struct Center {
     // Whether the first pass was so wide that the pixel nearest to a tap can stand for it.
     wide: bool,
     variance_mm2: f32,
+    // The Gaussian's largest weight: of a little, rows may stray further.
+    share: f32,
 }
 
 // Marks a row that strays: its sum was weighed from a pixel far off the center's tangent plane, on
@@ -310,7 +387,7 @@ fn row_of(q: vec2i, dy: f32, delta: f32, center: Center) -> vec4f {
     let d2 = max(distance2(there.mm, center.point.mm) - center.m00 * delta * delta, 0.0);
     let plane2 = center.m11 * dy * dy;
     if there.profile != center.point.profile
-        || d2 - plane2 > BEND * plane2 + STRAY * center.variance_mm2 {
+        || abs(d2 - plane2) * center.share > BEND * min(plane2, d2) + STRAY * center.variance_mm2 {
         return STRAYS;
     }
     return weight(d2, center.variance_mm2) * textureLoad(rows, q, 0);
@@ -325,8 +402,10 @@ fn row_at(y: i32, center: Center) -> vec4f {
         let nearest = sign(dx) * floor(abs(dx) + 0.5);
         return row_of(vec2i(center.pixel.x + i32(nearest), y), dy, nearest - dx, center);
     }
-    let q = vec2i(center.pixel.x + i32(floor(dx)), y);
-    let f = fract(dx);
+    // A pixel that weighs nothing must not tell whether the row strays.
+    let at = select(dx, round(dx), abs(dx - round(dx)) < NEGLIGIBLE_PX);
+    let q = vec2i(center.pixel.x + i32(floor(at)), y);
+    let f = fract(at);
     let left = row_of(q, dy, -f, center);
     if f == 0.0 {
         return left;
@@ -338,11 +417,11 @@ fn row_at(y: i32, center: Center) -> vec4f {
 // Second pass: over the rows along the sheared step (−κ, 1), which completes the square
 // M₀₀(dx + κ dy)² + (M₁₁ − κ²M₀₀)dy². Rows that stray are weighed anew from the center, in a loop
 // of their own, since few pixels have any.
-fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32) -> vec4f {
+fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32, share: f32) -> vec4f {
     let m11 = m.area * m.area / m.m00;
-    let variance_mm2 = lattice_variance(v, m.spacing.y);
+    let variance_mm2 = lattice_variance(v, spacing(m.lattice).y);
     let wide = v > WIDE_PX2 * m.m00;
-    let center = Center(pixel, here, m.shear, m.m00, m11, wide, variance_mm2);
+    let center = Center(pixel, here, m.shear, m.m00, m11, wide, variance_mm2, share);
     let first = max(pixel.y - reach.y, 0);
     let last = min(pixel.y + reach.y, size().y - 1);
     var total = vec4f(0.0);
@@ -383,12 +462,16 @@ fn fs_sum(vertex: Vertex) -> @location(0) vec4f {
     if all(g.rgb == vec3f(0.0)) {
         return vec4f(before, 1.0);
     }
-    let reach = reach(m.spacing, g.w);
+    let reach = reach(m.reach, g.w);
     var total: vec4f;
-    if all(reach <= vec2i(SQUARE_REACH)) {
-        total = square(pixel, here, m, reach, g.w);
+    let l = m.lattice;
+    // Without area it is no lattice: what is endless is not small.
+    let inverse = vec3f(l.z, -l.y, l.x) / max(l.x * l.z - l.y * l.y, 1e-24);
+    let steps = along_steps(g.w * inverse);
+    if all(steps.rho <= vec3f(SMALL)) && all(steps.rho > vec3f(-1e-3)) {
+        total = small(pixel, here, l, steps);
     } else {
-        total = sheared_rows(pixel, here, m, reach, g.w);
+        total = sheared_rows(pixel, here, m, reach, g.w, max(g.r, max(g.g, g.b)));
     }
     if total.a <= 0.0 {
         // No area to speak of: nothing to share with.

@@ -31,8 +31,8 @@ fn is_inside(pixel: vec2i) -> bool {
 }
 
 // ∂z over the mm of a pixel, from the steps from its neighbour and to the one on the other side: the mean
-// where they agree; else of the shorter one, as it bends towards the pixel, since the other jumps.
-// Beyond the frame nothing is known. Follows `tangent` of gaussian_sum.wgsl.
+// where they agree; else of the shorter one, as it curves towards the pixel, since the other jumps.
+// Beyond the frame nothing is known. Follows `tangent` and `one_sided` of gaussian_sum.wgsl.
 fn tangent(pixel: vec2i, step: vec2i, sides: vec2f, mm: f32) -> f32 {
     let lengths2 = sides * sides + mm * mm;
     let has_last = is_inside(pixel - step);
@@ -46,13 +46,14 @@ fn tangent(pixel: vec2i, step: vec2i, sides: vec2f, mm: f32) -> f32 {
         let way = select(-step, step, is_forward);
         let first = select(-sides.x, sides.y, is_forward);
         let second = z_at(pixel + 2 * way) - z_at(pixel + way);
-        let bend = first - second;
-        let least = min(first * first, second * second) + mm * mm;
-        let share = saturate(1.2 * (1.0 - bend * bend / least));
-        // On another layer it may be no number.
-        let bends_on = is_inside(pixel + 2 * way) && bend * bend < least;
+        let mm2 = mm * mm;
+        let first2 = first * first + mm2;
+        let both2 = (first + second) * (first + second) + 4.0 * mm2;
+        // Of another layer it may be no number.
+        let turn = (first * second + mm2) * inverseSqrt(first2 * (second * second + mm2));
+        let share = saturate(5.0 * (turn - 0.7)) * clamp(first2 / max(both2 - 2.0 * first2, 1e-20), 0.0, 1.0);
         known = first;
-        dz = select(first, first + 0.5 * share * bend, bends_on);
+        dz = select(first, first + share * (first - second), is_inside(pixel + 2 * way) && turn > 0.7);
         dz = select(-dz, dz, is_forward);
     }
     // What jumps on both sides, maybe to infinity, faces the camera for all that is known.

@@ -122,11 +122,10 @@ impl Head {
 /// in a float and back may be a place off, here 3e-5 mm, where pixels are .6 mm apart: slopes, by which
 /// areas are weighed, move by 5e-5 between two pixels.
 const APART: f32 = 2e-4;
-/// But for a value or two of each effect: since slopes at silhouettes are carried on as they bend, one is .0003
-/// apart by the plan and one .0005 by the exact effect, each at a corner of a silhouette. Why was not found;
-/// it is none of the thresholds from which on the exact effect sums rows anew.
+/// But for a value or two by a plan, which keeps half floats between its passes: where one is rounded the other
+/// way, it is a place of them off, or less as it is mixed with others. Seen: .0003 in red, nothing in green and blue.
 const BEYOND: usize = 2;
-const APART_AT_MOST: f32 = 6e-4;
+const HALF_PLACE: f32 = 1.0 / 1024.0;
 
 #[test]
 fn a_dump_scatters_as_the_frame_did() {
@@ -139,9 +138,14 @@ fn a_dump_scatters_as_the_frame_did() {
     let plan = Plan::new(&[Profile::SKIN], 0.01).unwrap();
     let dir = case.0.to_str().unwrap();
     let out = case.0.join("out.exr");
-    for (plan, how) in [
-        (Some(&plan), vec!["--max-error", "0.01", "--png", "--plan"]),
-        (None, vec!["--exact"]),
+    for (plan, how, may_be_beyond, at_most) in [
+        (
+            Some(&plan),
+            vec!["--max-error", "0.01", "--png", "--plan"],
+            BEYOND,
+            HALF_PLACE,
+        ),
+        (None, vec!["--exact"], 0, APART),
     ] {
         run(&[&[dir, "--out", out.to_str().unwrap()], how.as_slice()].concat()).unwrap();
         let ours = read_rgb(&out);
@@ -169,10 +173,10 @@ fn a_dump_scatters_as_the_frame_did() {
             "{how:?}: {apart:.1e} apart, {beyond} of {count} values beyond {APART:e}, {same} the same; \
              {apart_half:.1e} in half floats"
         );
-        assert!(apart < APART_AT_MOST, "{apart}");
-        assert!(beyond <= BEYOND, "{beyond} of {count}");
-        // One place of a half float: the device may round to either side.
-        assert!(apart_half < 1.0 / 1024.0 + APART_AT_MOST, "{apart_half}");
+        assert!(apart < at_most, "{apart}");
+        assert!(beyond <= may_be_beyond, "{beyond} of {count}");
+        // The device may round to either side.
+        assert!(apart_half < HALF_PLACE + at_most, "{apart_half}");
     }
     if let Some(keep) = std::env::var_os("FILTER_OUT") {
         let files = [
