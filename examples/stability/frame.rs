@@ -1,10 +1,10 @@
 //! A synthetic frame on the device, as a host would hand it over.
 
-use glam::{DVec3, Mat4};
+use glam::{DVec3, Mat3, Mat4};
 use half::f16;
 use subsurface::renderer::Gpu;
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Profile, ScreenFrame};
+use subsurface::{Normals, Profile, ScreenFrame};
 
 use crate::common::GBuffer;
 use crate::lab::OUTPUT;
@@ -25,6 +25,7 @@ pub struct Frame {
     irradiance: TextureView,
     depth: TextureView,
     profile_id: TextureView,
+    normal: Option<TextureView>,
     output: TextureView,
     projection: Mat4,
 }
@@ -54,31 +55,46 @@ impl Texels {
     }
 
     pub fn upload(&self, gpu: &Gpu) -> Frame {
-        let halves: Vec<[f16; 4]> = self
-            .irradiance
-            .iter()
-            .map(|e| e.map(f16::from_f32))
-            .collect();
-        let bits: Vec<[u16; 4]> = halves.iter().map(|e| e.map(f16::to_bits)).collect();
         let size = self.size;
         Frame {
-            irradiance: gpu.upload("irradiance", size, TextureFormat::Rgba16Float, &bits),
+            irradiance: halves(gpu, "irradiance", size, &self.irradiance),
             depth: gpu.upload("depth", size, TextureFormat::R32Float, &self.depth),
             profile_id: gpu.upload("profile id", size, TextureFormat::R8Uint, &self.profile_id),
+            normal: None,
             output: gpu.target("scattered", size, OUTPUT),
             projection: self.projection,
         }
     }
 }
 
+fn halves(gpu: &Gpu, label: &str, size: [u32; 2], texels: &[[f32; 4]]) -> TextureView {
+    let bits = texels.iter().map(|t| t.map(|c| f16::from_f32(c).to_bits()));
+    let bits: Vec<[u16; 4]> = bits.collect();
+    gpu.upload(label, size, TextureFormat::Rgba16Float, &bits)
+}
+
 impl Frame {
+    /// With the normals of what it shows.
+    pub fn with_normals(mut self, gpu: &Gpu, g: &GBuffer) -> Self {
+        let normals = g.hits.iter().map(|hit| {
+            let normal = hit.map_or(DVec3::ZERO, |h| h.normal);
+            normal.as_vec3().extend(0.0).to_array()
+        });
+        let normals: Vec<_> = normals.collect();
+        self.normal = Some(halves(gpu, "normal", g.view.size, &normals));
+        self
+    }
+
     /// In mm, of skin.
     pub fn inputs(&self) -> ScreenFrame<'_> {
         ScreenFrame {
             irradiance: &self.irradiance,
             depth: &self.depth,
             profile_id: Some(&self.profile_id),
-            normal: None,
+            normal: self.normal.as_ref().map(|texture| Normals {
+                texture,
+                to_view: Mat3::IDENTITY,
+            }),
             strength: None,
             viewport: None,
             output: &self.output,

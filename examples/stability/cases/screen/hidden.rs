@@ -116,7 +116,7 @@ fn cylinder(part: &'static str, rho_mm: f64, degrees: f64, texels: [u32; 2]) -> 
     let known = match (degrees > 90.0, rho_mm < 1.0) {
         (false, _) => vec![],
         (true, true) => unseen([0.17; 2]),
-        (true, false) => unseen([0.027, 0.015]),
+        (true, false) => unseen([0.018, 0.01]),
     };
     case(name(part, degrees), what, known, run)
 }
@@ -148,7 +148,7 @@ fn head(degrees: f64, quick: bool) -> Case {
         .run(lab)
     });
     let known = if degrees > 90.0 {
-        unseen([0.021, 0.016])
+        unseen([0.015, 0.014])
     } else {
         vec![]
     };

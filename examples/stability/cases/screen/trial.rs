@@ -7,7 +7,7 @@ use super::scene::Scene;
 use crate::case::Outcome;
 use crate::cases::{Crop, larger, worst};
 use crate::common::{GBuffer, Hit, View};
-use crate::frame::Texels;
+use crate::frame::{Frame, Texels};
 use crate::lab::Lab;
 
 /// What a method is held to.
@@ -41,9 +41,22 @@ impl Trial<'_> {
     /// # Errors
     /// A frame that a method refuses.
     pub fn run(&self, lab: &Lab) -> Result<Outcome, Error> {
+        self.over(lab, |frame, _| frame)
+    }
+
+    /// The same, of a host that hands normals over.
+    ///
+    /// # Errors
+    /// A frame that a method refuses.
+    pub fn run_with_normals(&self, lab: &Lab) -> Result<Outcome, Error> {
+        self.over(lab, |frame, g| frame.with_normals(&lab.gpu, g))
+    }
+
+    fn over(&self, lab: &Lab, more: impl Fn(Frame, &GBuffer) -> Frame) -> Result<Outcome, Error> {
         let width = self.view.size[0];
         let g = self.scene.shoot(&self.view);
         let frame = Texels::of(&g, DVec3::splat(self.background)).upload(&lab.gpu);
+        let frame = more(frame, &g);
         let mut results = lab.scatter(&frame.inputs())?;
         let asked: Vec<(usize, usize, Hit)> = self
             .crop
