@@ -123,7 +123,7 @@ fn tangent(pixel: vec2i, step: vec2i, here: Point) -> Tangent {
     // A factor of two in length is more than a smooth surface changes in a pixel.
     if has_forward && has_backward && max(f, b) <= 4.0 * min(f, b) {
         let bend = forward - backward;
-        let even = saturate(1.5 - 8.0 * dot(bend, bend) / min(f, b));
+        let even = saturate(1.5 - 8.0 * dot(bend, bend) / max(min(f, b), 1e-20));
         return Tangent(0.5 * (forward + backward), even);
     }
     if has_forward && (!has_backward || f < b) {
@@ -138,18 +138,18 @@ fn tangent(pixel: vec2i, step: vec2i, here: Point) -> Tangent {
 // The step at `here` on the circle through it, the next point and the one beyond; the less the sharper they
 // turn.
 //
-// Tangent to the circle through 0, a and b is a/a² − b/b², of which (b²a − a²b)/(b² − 2a²) goes as far
-// as a step. With b = a + c that is a + a²/(b² − 2a²)(a − c), for a line a + (a − c)/2.
+// Tangent to the circle through 0, a and b is a/a² − b/b², of which (b²a − a²b)/(b² − 2a²) goes one step
+// across the picture. With b = a + c that is a + a²/(b² − 2a²)(a − c), for a line a + (a − c)/2.
 fn one_sided(a: vec3f, beyond: Point, next: Point) -> vec3f {
-    let c = beyond.mm - next.mm;
+    // What is of another profile may be no number.
+    let c = select(vec3f(0.0), beyond.mm - next.mm, beyond.profile == next.profile);
     let a2 = dot(a, a);
     let b2 = dot(a + c, a + c);
-    // Of 0.7, or 45 degrees, are ridges. Of another layer it may be no number.
-    let turn = dot(a, c) * inverseSqrt(a2 * dot(c, c));
-    let is_same = beyond.profile == next.profile && turn > 0.7;
-    // No more than the last turn once again, since where exactly a rim ends is not known.
-    let share = saturate(5.0 * (turn - 0.7)) * clamp(a2 / max(b2 - 2.0 * a2, 1e-20), 0.0, 1.0);
-    return select(a, a + share * (a - c), is_same);
+    let turn = dot(a, c) * inverseSqrt(max(a2 * dot(c, c), 1e-30));
+    // A turn by 45 degrees is a ridge; and no more than the last turn once again, since where exactly a rim ends is
+    // not known.
+    let on = saturate(5.0 * (turn - 0.7)) * clamp(a2 / max(b2 - 2.0 * a2, 1e-20), 0.0, 1.0);
+    return a + on * (a - c);
 }
 
 // The pixel's frame on the surface: M = JᵀJ with J = (∂p/∂x ∂p/∂y).
@@ -159,10 +159,11 @@ struct Metric {
     // κ = M₀₁/M₀₀.
     shear: f32,
     m00: f32,
-    // The mm between pixels along a row and between sheared rows: of the surface, or of one that faces the
-    // camera where that is shorter.
-    reach: vec2f,
-    // M₀₀, M₀₁ and M₁₁ where the surface is even; where it bends, those of one that faces the camera.
+    // The mm between pixels along a row and between sheared rows; on the screen those of a surface that faces
+    // the camera, which are the shortest.
+    spacing: vec2f,
+    // M₀₀, M₀₁ and M₁₁ of the points, as the weights of narrow Gaussians need them: the surface's own; on the
+    // screen, the more it bends within a pixel, those of one that faces the camera.
     lattice: vec3f,
 }
 
@@ -171,9 +172,11 @@ fn metric(pixel: vec2i, here: Point) -> Metric {
     let facing = abs(mm);
     let is_screen = any(settings.spacing != vec4f(0.0));
     let along = tangent(pixel, vec2i(1, 0), here);
-    let across = tangent(pixel, vec2i(0, 1), here);
+    let down = tangent(pixel, vec2i(0, 1), here);
     var tx = along.mm;
-    var ty = across.mm;
+    var ty = down.mm;
+    // Normals tell an area, not where the points are.
+    let points = vec3f(dot(tx, tx), dot(tx, ty), dot(ty, ty));
     if settings.normals.has != 0u {
         let ray = settings.rays.xy + settings.rays.zw * (vec2f(pixel) + 0.5);
         let texel = textureLoad(normal, vec2i(settings.first_pixel) + pixel, 0).xyz;
@@ -194,15 +197,14 @@ fn metric(pixel: vec2i, here: Point) -> Metric {
         return Metric(steps.x * steps.y, 0.0, square.x, steps, vec3f(square.x, 0.0, square.y));
     }
     let area = length(cross(tx, ty));
-    let own = vec3f(xx, dot(tx, ty), yy);
-    let even = select(1.0, along.even * across.even, is_screen);
-    let lattice = mix(vec3f(facing.x * facing.x, 0.0, facing.y * facing.y), own, even);
-    let reach = select(vec2f(sqrt(xx), area / sqrt(xx)), facing, is_screen);
-    return Metric(area, own.y / xx, xx, reach, lattice);
+    let even = select(1.0, along.even * down.even, is_screen);
+    let lattice = mix(vec3f(facing.x * facing.x, 0.0, facing.y * facing.y), points, even);
+    let spacing = select(vec2f(sqrt(xx), area / sqrt(xx)), facing, is_screen);
+    return Metric(area, dot(tx, ty) / xx, xx, spacing, lattice);
 }
 
-// The mm between pixels along a row and between sheared rows.
-fn spacing(lattice: vec3f) -> vec2f {
+// The mm between points along a row and between sheared rows.
+fn rows_of(lattice: vec3f) -> vec2f {
     let along = sqrt(lattice.x);
     return vec2f(along, sqrt(max(lattice.z - lattice.y * lattice.y / lattice.x, 0.0)));
 }
@@ -274,8 +276,8 @@ fn fs_rows(vertex: Vertex) -> @location(0) vec4f {
     }
     let m = metric(pixel, here);
     let v = gaussian(here, vertex.gaussian).w;
-    let reach = reach(m.reach, v);
-    return row(pixel, here, reach.x, lattice_variance(v, spacing(m.lattice).x));
+    let reach = reach(m.spacing, v);
+    return row(pixel, here, reach.x, lattice_variance(v, rows_of(m.lattice).x));
 }
 
 // The pixels of a row around q, as `here` weighs them.
@@ -307,7 +309,7 @@ fn along_steps(c: vec3f) -> Steps {
     var u = vec2f(1.0, 0.0);
     var v = vec2f(0.0, 1.0);
     var w = vec2f(-1.0, -1.0);
-    // Twelve are enough up to 85 degrees; where they are not, some ρ is less than 0.
+    // Twelve are enough up to 87 degrees; where they are not, some ρ is less than 0.
     for (var i = 0; i < 12; i++) {
         if dot(u, covariance * v) > 0.0 {
             w = u - v;
@@ -323,24 +325,30 @@ fn along_steps(c: vec3f) -> Steps {
         }
     }
     let rho = -vec3f(dot(v, covariance * w), dot(w, covariance * u), dot(u, covariance * v));
-    return Steps(array(across(u), across(v), across(w)), rho);
+    return Steps(array(turned(u), turned(v), turned(w)), rho);
 }
 
-fn across(v: vec2f) -> vec2i {
+// By a right angle.
+fn turned(v: vec2f) -> vec2i {
     return vec2i(vec2f(-v.y, v.x));
 }
 
 // A small kernel on any slope: three taps along each of three steps, which pass a wave of 1.1 rad a step as their
-// variance asks. What is off the plane weighs as the plane does at that distance.
+// variance asks. What is a little off the plane weighs as the plane does at that distance; what is far off, nothing.
 fn small(pixel: vec2i, here: Point, lattice: vec3f, steps: Steps) -> vec4f {
     // w with 1 − 2w(1 − cos 1.1) = e^(−1.1² ρ/2), as a series since of no variance nothing may be left.
     let x = 0.605 * steps.rho;
-    let w = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0))) / 1.09280;
+    let w = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0))) / 1.09281;
     let exponents = log(max(w / (1.0 - 2.0 * w), vec3f(1e-30)));
     let last = size() - 1;
     var total = vec4f(0.0);
     for (var i = 0; i < 27; i++) {
         let n = vec3i(i % 3, (i / 3) % 3, i / 9) - 1;
+        let exponent = dot(vec3f(abs(n)), exponents);
+        // e⁻⁶⁰ is nothing: of no variance the pixel alone is left, and where one of the steps has none, nine taps.
+        if exponent < -60.0 {
+            continue;
+        }
         let offset = n.x * steps.e[0] + n.y * steps.e[1] + n.z * steps.e[2];
         let q = pixel + offset;
         if all(q >= vec2i(0)) && all(q <= last) {
@@ -348,9 +356,9 @@ fn small(pixel: vec2i, here: Point, lattice: vec3f, steps: Steps) -> vec4f {
             if there.profile == here.profile {
                 let d = vec2f(offset);
                 let plane2 = dot(lattice, vec3f(d.x * d.x, 2.0 * d.x * d.y, d.y * d.y));
-                // In the middle both are 0.
-                let off = select(1.0, distance2(there.mm, here.mm) / plane2, any(offset != vec2i(0)));
-                total += exp(dot(vec3f(abs(n)), exponents) * off) * textureLoad(source, q, 0);
+                let off = distance2(there.mm, here.mm) / max(plane2, 1e-20);
+                let is_middle = all(offset == vec2i(0));
+                total += exp(exponent * select(off, 1.0, is_middle)) * textureLoad(source, q, 0);
             }
         }
     }
@@ -368,8 +376,8 @@ struct Center {
     // Whether the first pass was so wide that the pixel nearest to a tap can stand for it.
     wide: bool,
     variance_mm2: f32,
-    // The Gaussian's largest weight: of a little, rows may stray further.
-    share: f32,
+    // The Gaussian's: of a little, rows may stray further.
+    largest_weight: f32,
 }
 
 // Marks a row that strays: its sum was weighed from a pixel far off the center's tangent plane, on
@@ -387,7 +395,7 @@ fn row_of(q: vec2i, dy: f32, delta: f32, center: Center) -> vec4f {
     let d2 = max(distance2(there.mm, center.point.mm) - center.m00 * delta * delta, 0.0);
     let plane2 = center.m11 * dy * dy;
     if there.profile != center.point.profile
-        || abs(d2 - plane2) * center.share > BEND * min(plane2, d2) + STRAY * center.variance_mm2 {
+        || abs(d2 - plane2) * center.largest_weight > BEND * min(plane2, d2) + STRAY * center.variance_mm2 {
         return STRAYS;
     }
     return weight(d2, center.variance_mm2) * textureLoad(rows, q, 0);
@@ -417,23 +425,23 @@ fn row_at(y: i32, center: Center) -> vec4f {
 // Second pass: over the rows along the sheared step (−κ, 1), which completes the square
 // M₀₀(dx + κ dy)² + (M₁₁ − κ²M₀₀)dy². Rows that stray are weighed anew from the center, in a loop
 // of their own, since few pixels have any.
-fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32, share: f32) -> vec4f {
+fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32, largest_weight: f32) -> vec4f {
     let m11 = m.area * m.area / m.m00;
-    let variance_mm2 = lattice_variance(v, spacing(m.lattice).y);
+    let variance_mm2 = lattice_variance(v, rows_of(m.lattice).y);
     let wide = v > WIDE_PX2 * m.m00;
-    let center = Center(pixel, here, m.shear, m.m00, m11, wide, variance_mm2, share);
+    let center = Center(pixel, here, m.shear, m.m00, m11, wide, variance_mm2, largest_weight);
     let first = max(pixel.y - reach.y, 0);
     let last = min(pixel.y + reach.y, size().y - 1);
     var total = vec4f(0.0);
     var first_stray = last + 1;
     var last_stray = first - 1;
     for (var y = first; y <= last; y++) {
-        let row = row_at(y, center);
-        if row.a < 0.0 {
+        let sum_of_row = row_at(y, center);
+        if sum_of_row.a < 0.0 {
             first_stray = min(first_stray, y);
             last_stray = y;
         } else {
-            total += row;
+            total += sum_of_row;
         }
     }
     for (var y = first_stray; y <= last_stray; y++) {
@@ -462,10 +470,10 @@ fn fs_sum(vertex: Vertex) -> @location(0) vec4f {
     if all(g.rgb == vec3f(0.0)) {
         return vec4f(before, 1.0);
     }
-    let reach = reach(m.reach, g.w);
+    let reach = reach(m.spacing, g.w);
     var total: vec4f;
     let l = m.lattice;
-    // Without area it is no lattice: what is endless is not small.
+    // Without area there is no lattice: but for no variance at all, what is endless is not small.
     let inverse = vec3f(l.z, -l.y, l.x) / max(l.x * l.z - l.y * l.y, 1e-24);
     let steps = along_steps(g.w * inverse);
     if all(steps.rho <= vec3f(SMALL)) && all(steps.rho > vec3f(-1e-3)) {

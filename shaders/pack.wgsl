@@ -45,15 +45,17 @@ fn tangent(pixel: vec2i, step: vec2i, sides: vec2f, mm: f32) -> f32 {
         let is_forward = has_next && (!has_last || lengths2.y < lengths2.x);
         let way = select(-step, step, is_forward);
         let first = select(-sides.x, sides.y, is_forward);
-        let second = z_at(pixel + 2 * way) - z_at(pixel + way);
+        let beyond = z_at(pixel + 2 * way) - z_at(pixel + way);
+        // Maybe to infinity.
+        let is_known = is_inside(pixel + 2 * way) && abs(beyond) < STEEPEST * mm;
+        let second = select(0.0, beyond, is_known);
         let mm2 = mm * mm;
         let first2 = first * first + mm2;
         let both2 = (first + second) * (first + second) + 4.0 * mm2;
-        // Of another layer it may be no number.
         let turn = (first * second + mm2) * inverseSqrt(first2 * (second * second + mm2));
-        let share = saturate(5.0 * (turn - 0.7)) * clamp(first2 / max(both2 - 2.0 * first2, 1e-20), 0.0, 1.0);
+        let on = saturate(5.0 * (turn - 0.7)) * clamp(first2 / max(both2 - 2.0 * first2, 1e-20), 0.0, 1.0);
         known = first;
-        dz = select(first, first + share * (first - second), is_inside(pixel + 2 * way) && turn > 0.7);
+        dz = select(first, first + on * (first - second), is_known);
         dz = select(-dz, dz, is_forward);
     }
     // What jumps on both sides, maybe to infinity, faces the camera for all that is known.

@@ -53,6 +53,28 @@ fn center(i: usize, size: u32) -> DVec2 {
     )
 }
 
+/// Texels of triangles that are a line, a point, or two at one place have no area, and next to none.
+#[test]
+fn texels_without_area_are_numbers() {
+    let forms: [fn(DVec2) -> DVec3; 4] = [
+        |at| DVec3::new(at.x + at.y, 0.0, 0.0) * 0.1,
+        |at| DVec3::new(at.x, 1e-7 * at.y, 0.0) * 0.1,
+        |_| DVec3::ZERO,
+        |at| DVec3::new(at.x.rem_euclid(4.0), at.y, 0.0) * 0.1,
+    ];
+    for (i, form) in forms.into_iter().enumerate() {
+        for variance_mm2 in [0.0, 1e-12, 1e-4, 1.0, 1e6] {
+            let even = |at: DVec2| Some((form(at), DVec3::splat(0.5)));
+            let out = scatter(16, &single_gaussian(variance_mm2), even);
+            for (at, e) in out.iter().enumerate() {
+                // Even light stays, whatever the weights.
+                let off = (*e - 0.5).abs().max_element();
+                assert!(off < 1e-5, "form {i}, {variance_mm2} mm², texel {at}: {e}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_stretched_patch_matches_the_closed_form() {
     // mm per texel along u and v: square, stretched 2:1, and sheared.

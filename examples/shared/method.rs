@@ -39,7 +39,7 @@ impl ScreenMethod for ScreenSpace {
         self.render(encoder);
     }
 
-    /// What the shaders load by `Profile::SKIN` where no row strays: positions, areas and
+    /// What the shaders load by `Profile::SKIN` facing the camera, where no row strays: positions, areas and
     /// the metric of each pass included.
     fn fetches(&self, px_per_mm: f64) -> Option<f64> {
         // A point and its four neighbours.
@@ -50,7 +50,8 @@ impl ScreenMethod for ScreenSpace {
             let reach = (3.5 * f64::from(g.variance_mm2).sqrt() * px_per_mm).ceil();
             let row = 2.0 * reach + 1.0;
             // Two loads a tap: its point, and its light or its row's sum.
-            let second = if reach <= 2.0 { row * row } else { row };
+            let is_small = f64::from(g.variance_mm2) * px_per_mm * px_per_mm <= 0.4;
+            let second = if is_small { 9.0 } else { row };
             fetches += 2.0 * METRIC + 2.0 * row + 2.0 * second;
             // The sum so far.
             fetches += if i > 0 { 1.0 } else { 0.0 };
