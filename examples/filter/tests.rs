@@ -122,10 +122,11 @@ impl Head {
 /// in a float and back may be a place off, here 3e-5 mm, where pixels are .6 mm apart: slopes, by which
 /// areas are weighed, move by 5e-5 between two pixels.
 const APART: f32 = 2e-4;
-/// But for a value or two by a plan, which keeps half floats between its passes: where one is rounded the other
-/// way, it is a place of them off, or less as it is mixed with others. Seen: .0003 in red, nothing in green and blue.
+/// But for a value or two of each effect, where a place of depth decides something: by a plan, how a half float
+/// between passes is rounded (seen: .0003 in red, nothing in green and blue); by the exact effect, whether a row of pixels
+/// strays from the plane and is summed anew (seen: .0004, and none where the bounds of that are 2 % wider).
 const BEYOND: usize = 2;
-const HALF_PLACE: f32 = 1.0 / 1024.0;
+const APART_AT_MOST: f32 = 6e-4;
 
 #[test]
 fn a_dump_scatters_as_the_frame_did() {
@@ -138,14 +139,9 @@ fn a_dump_scatters_as_the_frame_did() {
     let plan = Plan::new(&[Profile::SKIN], 0.01).unwrap();
     let dir = case.0.to_str().unwrap();
     let out = case.0.join("out.exr");
-    for (plan, how, may_be_beyond, at_most) in [
-        (
-            Some(&plan),
-            vec!["--max-error", "0.01", "--png", "--plan"],
-            BEYOND,
-            HALF_PLACE,
-        ),
-        (None, vec!["--exact"], 0, APART),
+    for (plan, how) in [
+        (Some(&plan), vec!["--max-error", "0.01", "--png", "--plan"]),
+        (None, vec!["--exact"]),
     ] {
         run(&[&[dir, "--out", out.to_str().unwrap()], how.as_slice()].concat()).unwrap();
         let ours = read_rgb(&out);
@@ -173,10 +169,10 @@ fn a_dump_scatters_as_the_frame_did() {
             "{how:?}: {apart:.1e} apart, {beyond} of {count} values beyond {APART:e}, {same} the same; \
              {apart_half:.1e} in half floats"
         );
-        assert!(apart < at_most, "{apart}");
-        assert!(beyond <= may_be_beyond, "{beyond} of {count}");
-        // The device may round to either side.
-        assert!(apart_half < HALF_PLACE + at_most, "{apart_half}");
+        assert!(apart < APART_AT_MOST, "{apart}");
+        assert!(beyond <= BEYOND, "{beyond} of {count}");
+        // One place of a half float: the device may round to either side.
+        assert!(apart_half < 1.0 / 1024.0 + APART_AT_MOST, "{apart_half}");
     }
     if let Some(keep) = std::env::var_os("FILTER_OUT") {
         let files = [
@@ -241,12 +237,15 @@ fn what_does_not_scatter_comes_out_as_it_was() {
             }
         }
     }
-    // Without ids all that has depth scatters, and nothing else.
+    // Without ids all that has depth scatters, and nothing else. Neighbours differ enough that none comes out as it
+    // was by chance.
+    let uneven = |i: usize, c: usize| odd(i, c) + (i % 3) as f32;
+    plane.irradiance(uneven);
     plane.json("/files/profile_id", json!("none"));
     plane.depth(|i| 0.5 * ids(i));
     let out = plane.run(&["--exact"]).unwrap();
     for (i, e) in out.into_iter().enumerate() {
-        let same = e == [0, 1, 2].map(|c| odd(i, c));
+        let same = e == [0, 1, 2].map(|c| uneven(i, c));
         assert_eq!(same, ids(i) == 0.0, "pixel {i}");
     }
 }
