@@ -424,7 +424,7 @@ fn row_at(y: i32, center: Center) -> vec4f {
 
 // Second pass: over the rows along the sheared step (−κ, 1), which completes the square
 // M₀₀(dx + κ dy)² + (M₁₁ − κ²M₀₀)dy². Rows that stray are weighed anew from the center, in a loop
-// of their own, since few pixels have any.
+// of their own, since most pixels have few.
 fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32, largest_weight: f32) -> vec4f {
     let m11 = m.area * m.area / m.m00;
     let variance_mm2 = lattice_variance(v, rows_of(m.lattice).y);
