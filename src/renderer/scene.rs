@@ -535,10 +535,22 @@ impl Reader<'_> {
             Some(uri) => read_uri(uri, self.base),
             None => embedded.map(<[u8]>::to_vec).ok_or("no bytes".into()),
         };
-        let decode = |bytes: Vec<u8>| image::load_from_memory(&bytes).map_err(|e| e.to_string());
         let input = || format!("{}, image {index}", self.input);
         let fail = |got| Error::new(input(), got, "a JPEG or PNG image");
-        let pixels = bytes.and_then(decode).map_err(fail)?.into_rgba8();
+        let bytes = bytes.map_err(fail)?;
+        // One by one the decoder holds them to 512 MiB.
+        let held = self.scene.images.iter().map(|i| i.rgba8.len() as u64).sum();
+        let [width, height] = image_size(&bytes).map_err(|e| fail(e.to_string()))?;
+        if !fits(held, [width, height]) {
+            let got = format!("{width}x{height} pixels after {} MiB of others", held >> 20);
+            return Err(Error::new(
+                input(),
+                got,
+                format!("{} MiB at most together", MOST_IMAGE_BYTES >> 20),
+            ));
+        }
+        let pixels = image::load_from_memory(&bytes).map_err(|e| fail(e.to_string()))?;
+        let pixels = pixels.into_rgba8();
         self.scene.images.push(Image {
             width: pixels.width(),
             height: pixels.height(),
@@ -547,6 +559,22 @@ impl Reader<'_> {
         self.images.insert(index, self.scene.images.len() - 1);
         Ok(self.scene.images.len() - 1)
     }
+}
+
+/// What all images of a scene may take when decoded: eight of 8192×8192.
+const MOST_IMAGE_BYTES: u64 = 2 << 30;
+
+/// Whether an image may follow those that take so many bytes.
+fn fits(held: u64, size: [u32; 2]) -> bool {
+    let [width, height] = size.map(u64::from);
+    let bytes = width.checked_mul(height).and_then(|n| n.checked_mul(4));
+    bytes.is_some_and(|bytes| held.saturating_add(bytes) <= MOST_IMAGE_BYTES)
+}
+
+/// The size that an image says it has, without its pixels.
+fn image_size(bytes: &[u8]) -> image::ImageResult<[u32; 2]> {
+    let reader = image::ImageReader::new(std::io::Cursor::new(bytes)).with_guessed_format()?;
+    reader.into_dimensions().map(<[u32; 2]>::from)
 }
 
 /// A primitive's attributes as the file has them, each empty if it has none.
@@ -747,6 +775,15 @@ mod tests {
                 .all(|v| v.normal == [0.0, 0.0, 1.0])
         );
         assert_eq!(scene.bounds(), (Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0)));
+    }
+
+    #[test]
+    fn images_have_a_budget_together() {
+        assert!(fits(0, [8192, 8192]));
+        assert!(fits(MOST_IMAGE_BYTES - 4, [1, 1]));
+        assert!(!fits(MOST_IMAGE_BYTES, [1, 1]));
+        assert!(!fits(u64::MAX, [1, 1]));
+        assert!(!fits(0, [u32::MAX; 2]));
     }
 
     #[test]
