@@ -9,6 +9,7 @@ mod damage;
 mod model;
 
 use glam::Vec3;
+use image::ImageFormat;
 use proptest::collection::vec;
 use proptest::num::f32::ANY;
 use proptest::prelude::*;
@@ -16,9 +17,23 @@ use subsurface::renderer::Scene;
 use subsurface::{DEFAULT_MAX_ERROR, Gaussian, Plan, Profile};
 
 use damage::{Damage, Lie, config};
-use model::{Model, flaw_of_profile, flaw_of_scene, glb};
+use model::{Model, flaw_of_profile, flaw_of_scene, glb, picture};
 
 const HEAD: &[u8] = include_bytes!("../examples/compare/head.glb");
+
+/// A picture's size is known before its pixels are, and so is that it does not fit.
+#[test]
+fn images_are_refused_before_they_are_decoded() {
+    let mut jpeg = picture(ImageFormat::Jpeg);
+    let frame = jpeg.windows(2).position(|w| w == [0xff, 0xc0]).unwrap();
+    jpeg[frame + 5..frame + 9].fill(255);
+    let mut model = Model::new();
+    model.set_picture(&jpeg);
+    let error = Scene::from_glb(&model.glb()).unwrap_err();
+    assert_eq!(error.input, "glTF, image 0");
+    assert_eq!(error.got, "65535x65535 pixels after 0 MiB of others");
+    assert_eq!(error.needs, "2048 MiB at most together");
+}
 
 /// That what is taken is as its documentation says, and what is not has a reason.
 fn scene(bytes: &[u8]) -> Result<(), TestCaseError> {

@@ -120,14 +120,16 @@ fn hard_edges_match_the_visible_sum() {
 
 #[test]
 fn slopes_match_the_closed_form() {
-    for (tilt, axis) in [
-        (60.0, 0.0),
-        (80.0, 0.0),
-        (80.0, 90.0),
-        (60.0, 45.0),
-        (80.0, 45.0),
-        (80.0, 20.0),
-        (80.0, 110.0),
+    // The last one's rows run down the slope askew, and are too wide for a small kernel: neither rows nor steps fit it well.
+    for (tilt, axis, at_most) in [
+        (60.0, 0.0, 0.0003),
+        (80.0, 0.0, 0.0003),
+        (80.0, 90.0, 0.0003),
+        (60.0, 45.0, 0.001),
+        (60.0, -45.0, 0.001),
+        (80.0, 45.0, 0.002),
+        (80.0, 20.0, 0.002),
+        (80.0, 110.0, 0.004),
     ] {
         let px_per_mm = 4.0;
         let view = View::orthographic([320, 320], px_per_mm);
@@ -154,7 +156,7 @@ fn slopes_match_the_closed_form() {
                 .map(|(i, h)| out[*i].x - scattered_step(place(h), blur_mm2, &Profile::SKIN).x));
             println!("tilt {tilt}° about {axis}°, edge at {edge}°: red RMS {error:.5}");
             assert!(
-                error <= 0.004,
+                error <= at_most,
                 "tilt {tilt}° about {axis}°, edge {edge}°: {error}"
             );
         }
@@ -230,9 +232,9 @@ fn a_sphere_matches_eq_7() {
             "{px_per_mm} px/mm: red RMS {whole:.5}, n_z > .35 {interior:.5}, unscattered {none:.5}"
         );
         // What the hidden half contributes is missing at the rim, whatever the method: that is most
-        // of the .0051 measured.
-        assert!(whole <= 0.006, "whole sphere: {whole}");
-        assert!(interior <= 0.003, "interior: {interior}");
+        // of the .0045 measured.
+        assert!(whole <= 0.005, "whole sphere: {whole}");
+        assert!(interior <= 0.002, "interior: {interior}");
     }
 }
 
@@ -253,9 +255,9 @@ fn a_sphere_matches_the_visible_sum() {
         "red RMS {red:.5}, blue RMS {blue:.5} over {} pixels",
         pixels.len()
     );
-    // Two passes over a sphere are not the full sum: .0023 measured, at the rim, against .0108 that
+    // Two passes over a sphere are not the full sum: .0016 measured, at the rim, against .0108 that
     // scattering does. Blue scatters too narrowly to see the bend.
-    assert!(red <= 0.003 && blue <= 0.0005, "red {red}, blue {blue}");
+    assert!(red <= 0.002 && blue <= 0.0001, "red {red}, blue {blue}");
 }
 
 #[test]
