@@ -194,6 +194,18 @@ struct Gathered {
     own: vec3f,
 }
 
+// Weights lie between those of two rows, and on simple tiles between those of the corners. Where one fades
+// to nothing what is left of it is a rounding error, of either sign: about 1e-7 on this side of 1, and more
+// where a GPU interpolates in fixed point. Nothing may be divided by it.
+const NEGLIGIBLE_WEIGHT = 1e-4;
+
+// The part that blurs have of the light, from what their taps found and what these weigh; of a weight that
+// is negligible the pixel's own light takes the place.
+fn blurred_by(light: vec3f, mass: vec3f, wanted: vec3f, e: vec3f) -> vec3f {
+    let mean = light / max(mass, vec3f(1e-20));
+    return wanted * select(e, mean, wanted > vec3f(NEGLIGIBLE_WEIGHT));
+}
+
 // On no surface of the coarser level, a < 0, this level's own light stands in for it.
 fn with_coarser(blurred: vec3f, wanted: vec3f, e: vec3f, rest: vec3f, coarser: vec4f) -> Gathered {
     let own = select(e, blurred / max(wanted, vec3f(1e-6)), wanted > vec3f(1e-3));
