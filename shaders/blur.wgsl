@@ -17,6 +17,8 @@
 @group(0) @binding(12) var linear: sampler;
 // How much a pixel takes of its scattered light.
 @group(0) @binding(4) var strength: texture_2d<f32>;
+// What multiplies what is added to a target.
+@group(0) @binding(5) var albedo: texture_2d<f32>;
 
 // How many blurs share their taps: (i, j) with i² + j² ≤ 2, or ≤ 4 where they are thirteen. One more may
 // have the square of 5×5, which is summed where it has weight.
@@ -219,11 +221,17 @@ fn mean_of(g: Gathered) -> vec4f {
     return half_floats(vec4f(mean, 1.0));
 }
 
-// What fs_frame tells of a pixel that takes so much of its scattered light: all of it, or what it differs
-// by from before. Writes no alpha: it is the host's.
-fn scattered(g: Gathered, e: vec3f, share: f32) -> vec4f {
+// What fs_frame tells of a pixel that takes so much of its scattered light: all of it, or, to be added, what
+// it differs by from before. Writes no alpha: it is the host's.
+fn scattered(pixel: vec2i, g: Gathered, e: vec3f, share: f32) -> vec4f {
     let difference = share * (g.light - e * g.weight);
-    return vec4f(select(e + difference, difference, DIFFERENCE), 1.0);
+    if !DIFFERENCE {
+        return vec4f(e + difference, 1.0);
+    }
+    if view.has_albedo == 0u {
+        return vec4f(difference, 1.0);
+    }
+    return vec4f(difference * textureLoad(albedo, vec2i(view.first_pixel) + pixel, 0).rgb, 1.0);
 }
 
 fn share_at(pixel: vec2i) -> f32 {

@@ -205,5 +205,5 @@ fn fs_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
         discard;
     }
     let e = textureLoad(here_light, pixel, 0).rgb;
-    return scattered(gathered(pixel, e, shape), e, share);
+    return scattered(pixel, gathered(pixel, e, shape), e, share);
 }

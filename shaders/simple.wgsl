@@ -121,5 +121,5 @@ fn fs_frame(tile: Corner) -> @location(0) vec4f {
         discard;
     }
     let e = textureLoad(here_light, pixel, 0);
-    return scattered(gathered(pixel, e, tile), e.rgb, share);
+    return scattered(pixel, gathered(pixel, e, tile), e.rgb, share);
 }

@@ -9,35 +9,26 @@
 //! the host in the examples and tests; `truth` sums the integrals that all is measured against.
 
 mod error;
+mod exact;
 mod frame;
-mod gaussian_sum;
-mod input;
+mod gpu;
+mod optics;
 mod plan;
-mod planned;
 mod profile;
 mod pyramid;
-#[cfg(feature = "renderer")]
-pub mod renderer;
 mod screen_space;
 mod texture_space;
-#[cfg(feature = "truth")]
-pub mod truth;
+mod validate;
 #[cfg(test)]
 mod wgsl;
 
 pub use error::Error;
-pub use frame::{Normals, Output, ScreenFrame, Viewport};
+pub use frame::{Frame, Output, Viewport};
 pub use plan::{DEFAULT_MAX_ERROR, Plan, Row};
-pub use planned::PlannedScreenSpace;
 pub use profile::{Gaussian, Profile};
-pub use screen_space::ScreenSpace;
+pub use screen_space::{ScreenSpace, View};
 pub use texture_space::{Atlas, TextureSpace};
 pub use wgpu;
 
 /// The most profiles that a frame can mix.
 pub const MAX_PROFILES: usize = 16;
-
-/// The code of the README compiles.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;

@@ -80,7 +80,7 @@ impl Responses {
                 let px2 = f64::from(g.variance_mm2) * px_per_mm * px_per_mm;
                 let directions = [[1, 0], OBLIQUE[0], OBLIQUE[1]];
                 let steps = directions.map(|across| (across, lattice_steps(across, px2)));
-                (g.weight.as_dvec3(), px2, steps)
+                (glam::DVec3::from(g.weight.map(f64::from)), px2, steps)
             })
             .collect();
         let mut wanted = [const { Vec::new() }; 3];
@@ -153,7 +153,7 @@ fn lattice_steps(across: [i32; 2], variance_px2: f64) -> Option<Vec<f64>> {
     Some(steps)
 }
 
-/// As `lattice_variance` in `shaders/gaussian_sum.wgsl`, in px².
+/// As `lattice_variance` in `shaders/exact/gaussian_sum.wgsl`, in px².
 fn lattice_variance(s: f64) -> f64 {
     const WAVE: f64 = 1.1;
     if !(1e-6..=0.4).contains(&s) {

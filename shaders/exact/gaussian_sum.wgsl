@@ -17,15 +17,13 @@ struct Settings {
     // The mm between neighbouring pixels of a surface that faces the camera, at view depth z:
     // |x + y·z| along a row, |z + w·z| along a column. Zero: as far as the surface itself says.
     spacing: vec4f,
-    // x and y over z at the corner of the viewport, and what a pixel adds.
-    rays: vec4f,
-    normals: Normals,
     mm_per_unit: f32,
     // Pixels to which the result is carried past the edge of the surface.
     gutter: i32,
     // Ids beyond this have no profile: no surface.
     profiles: u32,
     has_strength: u32,
+    has_albedo: u32,
     // Of the irradiance, the strength and the output, where these are larger than the surface.
     first_pixel: vec2u,
 }
@@ -42,7 +40,8 @@ struct Settings {
 @group(0) @binding(5) var sum: texture_2d<f32>;
 // How much a pixel takes of its scattered light.
 @group(0) @binding(6) var strength: texture_2d<f32>;
-@group(0) @binding(7) var normal: texture_2d<f32>;
+// What multiplies the light that is added to a target.
+@group(0) @binding(7) var albedo: texture_2d<f32>;
 
 // Beyond 3.5 σ a Gaussian on a plane holds e^(−3.5²/2) = .2 % of its mass.
 const REACH_SIGMAS = 3.5;
@@ -57,6 +56,11 @@ const NEGLIGIBLE_PX = 1.0 / 512.0;
 // share of the squared distance, and of the variance; by a Gaussian of full weight.
 const BEND = 0.03;
 const STRAY = 0.018;
+
+// Whether light is a number. By its bits, since compilers may take for granted that it is.
+fn is_finite(light: vec3f) -> bool {
+    return all((bitcast<vec3u>(light) & vec3u(0x7f800000u)) != vec3u(0x7f800000u));
+}
 
 struct Vertex {
     @builtin(position) position: vec4f,
@@ -173,21 +177,11 @@ fn metric(pixel: vec2i, here: Point) -> Metric {
     let is_screen = any(settings.spacing != vec4f(0.0));
     let along = tangent(pixel, vec2i(1, 0), here);
     let down = tangent(pixel, vec2i(0, 1), here);
-    var tx = along.mm;
-    var ty = down.mm;
-    // Normals tell an area, not where the points are.
+    let tx = along.mm;
+    let ty = down.mm;
     let points = vec3f(dot(tx, tx), dot(tx, ty), dot(ty, ty));
-    if settings.normals.has != 0u {
-        let ray = settings.rays.xy + settings.rays.zw * (vec2f(pixel) + 0.5);
-        let texel = textureLoad(normal, vec2i(settings.first_pixel) + pixel, 0).xyz;
-        let slope = slope_by_normal(settings.normals, texel, ray, mm);
-        if slope.is_known {
-            tx = vec3f(ray * slope.dz.x + vec2f(mm.x, 0.0), slope.dz.x);
-            ty = vec3f(ray * slope.dz.y + vec2f(0.0, mm.y), slope.dz.y);
-        }
-    }
-    let xx = dot(tx, tx);
-    let yy = dot(ty, ty);
+    let xx = points.x;
+    let yy = points.z;
     if xx == 0.0 || yy == 0.0 {
         // A strip one pixel wide has no width of its own: it is taken to be as wide as it faces the
         // camera, or as its pixels are long.
@@ -526,7 +520,26 @@ fn fs_resolve(vertex: Vertex) -> @location(0) vec4f {
     return before;
 }
 
-// What the result differs by from the input.
+// What an output that is added to is multiplied by.
+fn albedo_at(pixel: vec2i) -> vec3f {
+    if settings.has_albedo == 0u {
+        return vec3f(1.0);
+    }
+    return textureLoad(albedo, vec2i(settings.first_pixel) + pixel, 0).rgb;
+}
+
+// The result, to be added.
+@fragment
+fn fs_add(vertex: Vertex) -> @location(0) vec4f {
+    let pixel = vec2i(vertex.position.xy) - vec2i(settings.first_pixel);
+    var light = irradiance_at(pixel).rgb;
+    if point(pixel).profile != 0u {
+        light = taken(pixel);
+    }
+    return vec4f(albedo_at(pixel) * light, 0.0);
+}
+
+// What the result differs by from the input, to be added.
 @fragment
 fn fs_difference(vertex: Vertex) -> @location(0) vec4f {
     let pixel = vec2i(vertex.position.xy) - vec2i(settings.first_pixel);
@@ -535,5 +548,6 @@ fn fs_difference(vertex: Vertex) -> @location(0) vec4f {
     }
     let before = irradiance_at(pixel).rgb;
     // Nothing can be added to what is no number.
-    return vec4f(select(vec3f(0.0), taken(pixel) - before, is_finite(before)), 0.0);
+    let difference = select(vec3f(0.0), taken(pixel) - before, is_finite(before));
+    return vec4f(albedo_at(pixel) * difference, 0.0);
 }
