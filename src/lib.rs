@@ -5,8 +5,7 @@
 //! an atlas of a mesh, the way of the paper; it is the reference that the screen is compared with.
 //! Both blur by a [`Profile`], a sum of Gaussians with variances in mm².
 //!
-//! Features: `json` reads profiles from files; `renderer` is a small deferred renderer that plays
-//! the host in the examples and tests; `truth` sums the integrals that all is measured against.
+//! The feature `json` reads profiles from files.
 
 mod error;
 mod frame;
@@ -16,12 +15,8 @@ mod plan;
 mod planned;
 mod profile;
 mod pyramid;
-#[cfg(feature = "renderer")]
-pub mod renderer;
 mod screen_space;
 mod texture_space;
-#[cfg(feature = "truth")]
-pub mod truth;
 #[cfg(test)]
 mod wgsl;
 

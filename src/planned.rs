@@ -116,11 +116,6 @@ impl PlannedScreenSpace {
         Ok(())
     }
 
-    #[cfg(all(test, feature = "renderer"))]
-    pub(crate) fn pyramid(&self) -> &Pyramid {
-        &self.pyramid
-    }
-
     /// Records the frame that was last prepared; nothing before the first.
     pub fn render(&self, encoder: &mut CommandEncoder) {
         self.render_by_pass(encoder, |_, _| ());
