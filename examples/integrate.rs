@@ -5,11 +5,11 @@
 //! has. What a host writes is `struct Skin` or `struct SkinAtlas`, and their functions.
 
 use glam::Mat4;
-use subsurface::renderer::Gpu;
 use subsurface::wgpu::{self, TextureFormat};
 use subsurface::{
     Atlas, DEFAULT_MAX_ERROR, Error, Plan, PlannedScreenSpace, Profile, ScreenFrame, TextureSpace,
 };
+use subsurface_lab::renderer::Gpu;
 
 /// What the deferred renderer has by the time its diffuse light is done.
 struct Frame {

@@ -1,18 +1,16 @@
 //! What a host may ask for beyond a frame of its own: a part of a target, ids or none, less of the
 //! effect, sums in place; by both effects.
 
-mod common;
-
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
-use common::{View, gpu, plane, sphere};
 use glam::{DMat4, DVec3, DVec4, Mat3, Mat4};
-use subsurface::truth::closed_form::step;
 use subsurface::wgpu::{CommandEncoder, TextureFormat, TextureView};
 use subsurface::{
     Normals, Output, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace, Viewport,
 };
+use subsurface_lab::synthetic::{View, gpu, plane, sphere};
+use subsurface_lab::truth::closed_form::step;
 
 const SIZE: [u32; 2] = [96, 80];
 const HALF: TextureFormat = TextureFormat::Rgba16Float;
@@ -517,7 +515,9 @@ fn normals_say_what_depth_says() {
     // A camera that looks elsewhere than along the world's axes.
     let to_view = Mat3::from_rotation_y(0.7) * Mat3::from_rotation_x(-0.4);
     let normals = |encode: &dyn Fn(glam::Vec3) -> glam::Vec3| -> Vec<[f32; 4]> {
-        let normal = |h: &Option<common::Hit>| h.map_or(glam::Vec3::ZERO, |h| h.normal.as_vec3());
+        let normal = |h: &Option<subsurface_lab::synthetic::Hit>| {
+            h.map_or(glam::Vec3::ZERO, |h| h.normal.as_vec3())
+        };
         let encoded = seen
             .hits
             .iter()
@@ -548,7 +548,7 @@ fn normals_say_what_depth_says() {
         assert!(largest_difference(&world, &by_normals) <= 0.001);
         let red_rms = |out: &[[f32; 4]]| {
             let out: Vec<DVec3> = out.iter().map(|p| DVec3::splat(p[0].into())).collect();
-            common::rms(seen.errors(&out, &asked).iter().map(|e| e.x))
+            subsurface_lab::synthetic::rms(seen.errors(&out, &asked).iter().map(|e| e.x))
         };
         // Other normals are other areas, and other light.
         assert!(by_normals != by_depth);

@@ -1,16 +1,14 @@
 //! Inputs that do not fit are named, never a panic or a validation error of the device.
 
-mod common;
-
 use std::sync::OnceLock;
 
-use common::gpu;
 use glam::{Mat3, Mat4};
 use subsurface::wgpu::{self, TextureFormat, TextureUsages, TextureView};
 use subsurface::{
     Atlas, Error, Normals, Output, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace,
     TextureSpace, Viewport,
 };
+use subsurface_lab::synthetic::gpu;
 
 const SIZE: [u32; 2] = [16, 8];
 
@@ -48,7 +46,9 @@ fn screen(change: impl FnOnce(&mut Inputs)) -> Result<(), Error> {
         strength: None,
         output: view(TextureFormat::Rgba16Float),
         viewport: None,
-        projection: common::View::perspective(SIZE, 40.0).projection.as_mat4(),
+        projection: subsurface_lab::synthetic::View::perspective(SIZE, 40.0)
+            .projection
+            .as_mat4(),
         mm_per_unit: 1.0,
         profiles: vec![Profile::SKIN],
     };
@@ -328,7 +328,9 @@ fn what_a_plan_cannot_do_is_named() {
         strength: None,
         viewport: None,
         output: &views[2],
-        projection: common::View::perspective(SIZE, 40.0).projection.as_mat4(),
+        projection: subsurface_lab::synthetic::View::perspective(SIZE, 40.0)
+            .projection
+            .as_mat4(),
         mm_per_unit: 1.0,
         profiles: &[Profile::SKIN],
     };
@@ -369,7 +371,9 @@ fn a_frame_that_was_refused_leaves_the_one_before() {
         strength: None,
         viewport: None,
         output: &outputs[0],
-        projection: common::View::perspective(SIZE, 40.0).projection.as_mat4(),
+        projection: subsurface_lab::synthetic::View::perspective(SIZE, 40.0)
+            .projection
+            .as_mat4(),
         mm_per_unit: 1.0,
         profiles: &[Profile::SKIN],
     };
@@ -460,7 +464,9 @@ fn sizes_may_change_from_frame_to_frame() {
                     strength: None,
                     viewport: None,
                     output: &target(TextureFormat::Rgba16Float),
-                    projection: common::View::perspective(size, 40.0).projection.as_mat4(),
+                    projection: subsurface_lab::synthetic::View::perspective(size, 40.0)
+                        .projection
+                        .as_mat4(),
                     mm_per_unit: 1.0,
                     profiles: &[Profile::SKIN],
                 },

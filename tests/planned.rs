@@ -1,14 +1,12 @@
 //! Scattering by a plan against closed forms, and against what the plan states.
 
-mod common;
-
 use std::sync::OnceLock;
 
-use common::*;
 use glam::{DVec2, DVec3};
-use subsurface::truth::closed_form::{scattered_cosine, scattered_step, step};
 use subsurface::wgpu::TextureFormat;
 use subsurface::{Plan, PlannedScreenSpace, Profile, ScreenFrame};
+use subsurface_lab::synthetic::*;
+use subsurface_lab::truth::closed_form::{scattered_cosine, scattered_step, step};
 
 /// Plans of the skin profile at 1/100 and 1/255.
 fn plans() -> &'static [Plan; 2] {

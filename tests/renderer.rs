@@ -1,13 +1,9 @@
 //! The whole way from a head to both modes' layers, by the renderer that plays the host.
 
-mod common;
-
-use common::gpu;
-use subsurface::renderer::{AtlasRenderer, Camera, Layer, Lighting, Renderer, Scene, View};
 use subsurface::wgpu::TextureView;
 use subsurface::{Atlas, Error, Profile, ScreenFrame, ScreenSpace, TextureSpace};
-
-const HEAD: &[u8] = include_bytes!("../examples/compare/head.glb");
+use subsurface_lab::renderer::{AtlasRenderer, Camera, Layer, Lighting, Renderer, Scene, View};
+use subsurface_lab::synthetic::gpu;
 const SIZE: [u32; 2] = [256, 256];
 
 struct Head {
@@ -61,7 +57,7 @@ fn scatter_texture(head: &Head, size: u32, output: &TextureView) -> Result<(), E
 
 #[test]
 fn both_modes_agree_better_than_with_no_scattering() {
-    let scene = Scene::from_glb(HEAD).unwrap();
+    let scene = Scene::from_glb(subsurface_lab::HEAD).unwrap();
     let head = render(&scene);
     let screen = gpu().read(&screen_space(&head));
     let output = head.renderer.scattered_target(gpu());
@@ -106,7 +102,7 @@ fn both_modes_agree_better_than_with_no_scattering() {
 
 #[test]
 fn a_mesh_without_uvs_scatters_in_screen_space_only() {
-    let mut scene = Scene::from_glb(HEAD).unwrap();
+    let mut scene = Scene::from_glb(subsurface_lab::HEAD).unwrap();
     for primitive in &mut scene.primitives {
         primitive.pages.clear(); // as the loader leaves it where TEXCOORD_0 is missing
     }
@@ -127,7 +123,7 @@ fn a_mesh_without_uvs_scatters_in_screen_space_only() {
 
 #[test]
 fn the_picture_shows_a_lit_head() {
-    let scene = Scene::from_glb(HEAD).unwrap();
+    let scene = Scene::from_glb(subsurface_lab::HEAD).unwrap();
     let head = render(&scene);
     let irradiance = &head.renderer.gbuffer.irradiance;
     let picture = head
@@ -151,7 +147,7 @@ fn the_picture_shows_a_lit_head() {
 
 #[test]
 fn sizes_that_do_not_fit_are_named() {
-    let scene = Scene::from_glb(HEAD).unwrap();
+    let scene = Scene::from_glb(subsurface_lab::HEAD).unwrap();
     for size in [[0, 10], [10, 0], [100_000, 10], [8192, 8192]] {
         let error = Renderer::new(gpu(), &scene, size).err().expect("refused");
         assert_eq!(error.input, "size");

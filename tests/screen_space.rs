@@ -1,12 +1,10 @@
 //! The screen-space effect against closed forms and the visible integral.
 
-mod common;
-
-use common::*;
 use glam::{DMat4, DVec2, DVec3, DVec4};
-use subsurface::truth::closed_form::{scattered_cosine, scattered_step, step};
 use subsurface::wgpu::{self, TextureFormat};
 use subsurface::{Gaussian, Profile, ScreenFrame, ScreenSpace};
+use subsurface_lab::synthetic::*;
+use subsurface_lab::truth::closed_form::{scattered_cosine, scattered_step, step};
 
 /// A step of this error in a picture is one step of eight bits.
 const STEP: f64 = 1.0 / 255.0;

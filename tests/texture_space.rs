@@ -1,12 +1,10 @@
 //! The texture-space path against closed forms.
 
-mod common;
-
-use common::*;
 use glam::{DVec2, DVec3};
-use subsurface::truth::closed_form::{scattered_cosine, scattered_step, step};
 use subsurface::wgpu::TextureFormat;
 use subsurface::{Atlas, Profile, TextureSpace};
+use subsurface_lab::synthetic::*;
+use subsurface_lab::truth::closed_form::{scattered_cosine, scattered_step, step};
 
 /// Position in mm and irradiance of a texel; `None` off the islands.
 type Texel = Option<(DVec3, DVec3)>;

@@ -1,17 +1,15 @@
 //! The truths against closed forms, and against each other.
 
-mod common;
-
 use std::f64::consts::{PI, TAU};
 
-use common::*;
 use glam::{DMat3, DVec3, Vec3};
 use subsurface::Profile;
-use subsurface::truth::closed_form::{
+use subsurface_lab::synthetic::*;
+use subsurface_lab::truth::closed_form::{
     legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_cosine_around,
     scattered_spot, scattered_step, step, through_slab,
 };
-use subsurface::truth::{Patch, Place, SurfaceIntegral, Triangles, surface_integral};
+use subsurface_lab::truth::{Patch, Place, SurfaceIntegral, Triangles, surface_integral};
 
 /// What a truth may be off by.
 const EXACT: f64 = 0.0005;
