@@ -1,13 +1,11 @@
 //! Plans beside the exact effect on a head, over sizes of the frame, views, profiles and errors: what one
 //! size hides, another shows.
 
-mod common;
-
-use common::gpu;
-use subsurface::renderer::{Camera, Lighting, Renderer, Scene, View};
 use subsurface::{Gaussian, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace};
+use subsurface_lab::renderer::{Camera, Lighting, Renderer, Scene, View};
+use subsurface_lab::synthetic::gpu;
 
-const HEAD: &[u8] = include_bytes!("../examples/compare/head.glb");
+const HEAD: &[u8] = subsurface_lab::HEAD;
 
 /// What a plan may differ by from the exact effect, in units of white: at the worst crease of the head, the
 /// line of the lips, coarse pixels hold light from both sides.

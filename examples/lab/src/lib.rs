@@ -4,6 +4,7 @@
 pub mod chart;
 pub mod compare;
 pub mod damage;
+mod error;
 pub mod filter;
 mod method;
 pub mod metrics;
@@ -18,6 +19,8 @@ pub mod synthetic;
 pub mod truth;
 #[cfg(test)]
 mod wgsl;
+
+pub use error::Error;
 
 /// The built-in head: made from the MakeHuman base mesh (CC0) by `compare/make_head.py`.
 pub const HEAD: &[u8] = include_bytes!("compare/head.glb");

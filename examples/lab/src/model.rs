@@ -206,10 +206,10 @@ fn flaw_of_primitive(p: &Primitive) -> Option<String> {
 pub fn flaw_of_profile(profile: &Profile) -> Option<String> {
     let gaussians = profile.gaussians();
     let fits = gaussians.iter().all(|g| {
-        let numbers = g.weight.to_array().into_iter().chain([g.variance_mm2]);
+        let numbers = g.weight.into_iter().chain([g.variance_mm2]);
         numbers.into_iter().all(|x| x.is_finite() && x >= 0.0)
     });
-    let sum: glam::Vec3 = gaussians.iter().map(|g| g.weight).sum();
+    let sum: glam::Vec3 = gaussians.iter().map(|g| glam::Vec3::from(g.weight)).sum();
     let whole = (sum - 1.0).abs().max_element() < 1e-5;
     (!fits || !whole || gaussians.is_empty()).then(|| format!("{profile:?}"))
 }

@@ -4,8 +4,10 @@
 use std::sync::OnceLock;
 
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
-use subsurface::wgpu::{CommandEncoder, TextureFormat};
-use subsurface::{Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace};
+use subsurface::wgpu::TextureFormat;
+use subsurface::{Frame, Plan, Profile};
+
+use crate::method::{self, Ours};
 
 use crate::renderer::Gpu;
 use crate::truth::{self, Patch, Pixel};
@@ -19,7 +21,7 @@ pub fn gpu() -> &'static Gpu {
 pub fn single_gaussian(variance_mm2: f32) -> Profile {
     Profile::new(&[subsurface::Gaussian {
         variance_mm2,
-        weight: glam::Vec3::ONE,
+        weight: [1.0; 3],
     }])
     .unwrap()
 }
@@ -147,32 +149,21 @@ impl GBuffer {
     }
 
     pub fn scatter_all(&self, profiles: &[Profile], format: TextureFormat) -> Vec<[f32; 4]> {
-        let device = &gpu().device;
-        let mut effect = ScreenSpace::new(device, format).unwrap();
-        self.render(profiles, format, |frame, encoder| {
-            effect.prepare(device, frame).unwrap();
-            effect.render(encoder);
-        })
+        let plan = Plan::exact(profiles).expect("a plan of these profiles");
+        self.scatter_by(&plan, format, |_| ())
     }
 
-    /// The effect by a plan of these profiles, with full floats in and out.
-    pub fn scatter_planned(&self, profiles: &[Profile], plan: &Plan) -> Vec<[f32; 4]> {
-        let format = TextureFormat::Rgba32Float;
-        let mut effect = PlannedScreenSpace::new(&gpu().device, format).unwrap();
-        self.render(profiles, format, |frame, encoder| {
-            effect
-                .prepare(&gpu().device, &gpu().queue, frame, plan)
-                .unwrap();
-            effect.render(encoder);
-        })
+    /// The effect by a plan, with full floats in and out.
+    pub fn scatter_planned(&self, plan: &Plan) -> Vec<[f32; 4]> {
+        self.scatter_by(plan, TextureFormat::Rgba32Float, |_| ())
     }
 
-    /// What an effect makes of the frame.
-    pub fn render(
+    /// What the effect makes of the frame by a plan, after `change`.
+    pub fn scatter_by(
         &self,
-        profiles: &[Profile],
+        plan: &Plan,
         format: TextureFormat,
-        effect: impl FnOnce(&ScreenFrame, &mut CommandEncoder),
+        change: impl FnOnce(&mut Frame),
     ) -> Vec<[f32; 4]> {
         let gpu = gpu();
         let size = self.view.size;
@@ -188,21 +179,18 @@ impl GBuffer {
             }));
             id.push(hit.map_or(0, |h| h.id as u8));
         }
-        let output = gpu.target("output", size, format);
         let full = TextureFormat::Rgba32Float;
-        let frame = ScreenFrame {
-            irradiance: &gpu.upload("irradiance", size, full, &irradiance),
-            depth: &gpu.upload("depth", size, TextureFormat::R32Float, &depth),
-            profile_id: Some(&gpu.upload("profile id", size, TextureFormat::R8Uint, &id)),
-            normal: None,
-            strength: None,
-            viewport: None,
-            output: &output,
-            projection: self.view.projection.as_mat4(),
-            mm_per_unit: 1.0,
-            profiles,
-        };
-        gpu.run(|encoder| effect(&frame, encoder));
+        let irradiance = gpu.upload("irradiance", size, full, &irradiance);
+        let depth = gpu.upload("depth", size, TextureFormat::R32Float, &depth);
+        let id = gpu.upload("profile id", size, TextureFormat::R8Uint, &id);
+        let projection = self.view.projection.as_mat4().to_cols_array_2d();
+        let mut frame = Frame::new(&irradiance, &depth, projection);
+        frame.profile_id = Some(&id);
+        frame.mm_per_unit = 1.0;
+        change(&mut frame);
+        let output = gpu.target("output", size, format);
+        let mut ours = Ours::new(&gpu.device, format, plan).expect("a device for the effect");
+        method::scatter(gpu, &mut ours, &frame, &output).expect("a frame that fits");
         gpu.read(&output)
     }
 

@@ -24,7 +24,7 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use subsurface::Error;
+use subsurface_lab::Error;
 use subsurface_lab::renderer::{Camera, Gpu, Scene, View};
 use winit::application::ApplicationHandler;
 use winit::event::{StartCause, WindowEvent};

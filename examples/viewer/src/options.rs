@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use subsurface::Error;
+use subsurface_lab::Error;
 
 const HELP: &str = "\
 A head in a window: scattered by each mode, or by two of them on the sides of a divider.

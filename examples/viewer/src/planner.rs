@@ -4,7 +4,8 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Instant;
 
-use subsurface::{Error, Plan, Profile};
+use subsurface::{Plan, Profile};
+use subsurface_lab::Error;
 
 /// What a plan is to be made for.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use image::RgbImage;
-use subsurface::Error;
+use subsurface_lab::Error;
 
 use subsurface_lab::output;
 

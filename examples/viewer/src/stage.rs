@@ -9,9 +9,8 @@ use std::time::Instant;
 
 use image::RgbImage;
 use subsurface::wgpu::TextureView;
-use subsurface::{
-    Atlas, Error, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace, TextureSpace,
-};
+use subsurface::{Atlas, Frame, Plan, Profile, ScreenSpace, TextureSpace, View};
+use subsurface_lab::Error;
 use subsurface_lab::metrics;
 use subsurface_lab::renderer::{
     AtlasRenderer, Camera, Gpu, Layer as Shown, Lighting, Renderer, Scene,

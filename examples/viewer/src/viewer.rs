@@ -9,7 +9,8 @@ use egui::{
     Response, Sense, Stroke, TextureHandle, Ui, Vec2,
 };
 use image::RgbImage;
-use subsurface::{Error, Gaussian, Profile};
+use subsurface::{Gaussian, Profile};
+use subsurface_lab::Error;
 use subsurface_lab::renderer::Lighting;
 
 use crate::layer::{Layer, Mode};

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use subsurface::{Error, wgpu};
+use subsurface::wgpu;
+use subsurface_lab::Error;
 use winit::dpi::PhysicalSize;
 use winit::event::WindowEvent;
 use winit::event_loop::ActiveEventLoop;

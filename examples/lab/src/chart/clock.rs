@@ -3,9 +3,11 @@
 
 use std::time::Instant;
 
-use crate::renderer::Gpu;
+use subsurface::wgpu::TextureView;
 
+use crate::Error;
 use crate::method::ScreenMethod;
+use crate::renderer::Gpu;
 
 /// Rounds that a method takes part in.
 #[derive(Clone, Copy)]
@@ -19,12 +21,15 @@ pub struct Rounds {
 
 /// Milliseconds of each method, one a round; prepared before, and warmed up. `compared` tells which
 /// go on after the others are done.
+///
+/// # Errors
+/// An output that a method refuses.
 pub fn rounds(
     gpu: &Gpu,
-    methods: &[(&dyn ScreenMethod, bool)],
+    methods: &[(&dyn ScreenMethod, &TextureView, bool)],
     rounds: Rounds,
     mut tick: impl FnMut(),
-) -> Vec<Vec<f64>> {
+) -> Result<Vec<Vec<f64>>, Error> {
     let mut times = vec![Vec::new(); methods.len()];
     let mut since = Instant::now();
     for round in 0..rounds.compared.max(rounds.all) {
@@ -40,16 +45,16 @@ pub fn rounds(
             } else {
                 methods.len() - 1 - i
             };
-            let (method, compared) = methods[i];
+            let (method, output, compared) = methods[i];
             if round < rounds.all || compared && round < rounds.compared {
                 let start = Instant::now();
-                gpu.run(|encoder| method.render(encoder));
+                gpu.run(|encoder| method.render(encoder, output))?;
                 times[i].push(start.elapsed().as_secs_f64() * 1e3);
             }
         }
         tick();
     }
-    times
+    Ok(times)
 }
 
 pub fn median(values: &[f64]) -> f64 {

@@ -1,7 +1,7 @@
 //! What a pixel of skin costs, near and far, and a frame without any.
 
+use crate::Error;
 use glam::DVec2;
-use subsurface::Error;
 
 use crate::chart::clock;
 use crate::chart::scene::{Scene, flat};

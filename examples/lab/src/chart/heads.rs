@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
+use crate::Error;
 use subsurface::wgpu::TextureView;
-use subsurface::{Error, Profile};
 
 use crate::chart::options::Plan;
 use crate::chart::plot::Series;
@@ -49,10 +49,10 @@ pub fn figure(
         skin.push(scene.pixels.len().to_string());
         let output = head.renderer.scattered_target(gpu);
         if let Some(screen) = &mut screen {
-            screen.prepare(&gpu.device, &scene.frame(&output))?;
+            screen.prepare(&gpu.device, &gpu.queue, &scene.frame())?;
             let ms = median_ms(plan, || {
                 let start = Instant::now();
-                gpu.run(|encoder| screen.render(encoder));
+                gpu.run(|encoder| screen.render(encoder, &output))?;
                 Ok(start.elapsed().as_secs_f64() * 1e3)
             })?;
             on_screen.push((heads as f64, 1e3 / ms));
@@ -104,11 +104,10 @@ pub fn time_atlas(
     output: &TextureView,
 ) -> Result<f64, Error> {
     let mut blur_ms = 0.0;
-    let profiles = [Profile::SKIN];
-    let raster_ms = atlas.render(gpu, renderer, &profiles, mm_per_unit, output, |atlas| {
-        method.prepare(&gpu.device, atlas)?;
+    let raster_ms = atlas.render(gpu, renderer, 1, mm_per_unit, output, |atlas, to| {
+        method.prepare(&gpu.device, &gpu.queue, atlas)?;
         let start = Instant::now();
-        gpu.run(|encoder| method.render(encoder));
+        gpu.run(|encoder| method.render(encoder, to))?;
         blur_ms += start.elapsed().as_secs_f64() * 1e3;
         Ok(())
     })?;

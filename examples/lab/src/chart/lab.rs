@@ -2,11 +2,12 @@
 
 use std::time::{Duration, Instant};
 
+use crate::Error;
 use glam::Vec3;
 use image::RgbImage;
 use indicatif::{ProgressBar, ProgressStyle};
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Error, PlannedScreenSpace, Profile, ScreenSpace, TextureSpace};
+use subsurface::{Profile, TextureSpace};
 
 use crate::chart::clock;
 use crate::chart::costs;
@@ -18,7 +19,7 @@ use crate::chart::row::Row;
 use crate::chart::scene::{Head, Scene, Surface, rgb};
 use crate::chart::score::{Knows, Score};
 use crate::chart::truths::Truths;
-use crate::method::{AtlasMethod, Planned, ScreenMethod};
+use crate::method::{self, AtlasMethod, Ours, ScreenMethod};
 use crate::renderer::{AtlasRenderer, Gpu, Scene as Model};
 use crate::rivals;
 
@@ -134,14 +135,11 @@ impl<'a> Lab<'a> {
     fn screen_methods(&self) -> Result<Vec<rivals::Screen>, Error> {
         let device = &self.gpu.device;
         let mut methods = rivals::screen(device, OUTPUT, &Profile::SKIN)?;
-        let exact = ScreenSpace::new(device, OUTPUT)?;
+        let exact = subsurface::Plan::exact(&[Profile::SKIN])?;
+        let exact = Ours::new(device, OUTPUT, &exact)?;
         methods.insert(1, ("screen_exact", String::new(), Box::new(exact)));
         for (i, (setting, plan)) in self.plans.iter().enumerate() {
-            let planned = Planned {
-                effect: PlannedScreenSpace::new(device, OUTPUT)?,
-                queue: self.gpu.queue.clone(),
-                plan: plan.clone(),
-            };
+            let planned = Ours::new(device, OUTPUT, plan)?;
             methods.insert(
                 2 + i,
                 ("screen_planned", setting.clone(), Box::new(planned)),
@@ -158,24 +156,23 @@ impl<'a> Lab<'a> {
         let mut methods = self.screen_methods()?;
         self.begin(format!("{}: warming up", scene.name), methods.len());
         let output = gpu.target("scattered", scene.size, OUTPUT);
-        let frame = scene.frame(&output);
+        let frame = scene.frame();
         let mut results = Vec::new();
         for (_, _, method) in &mut methods {
-            method.prepare(&gpu.device, &frame)?;
-            gpu.run(|encoder| method.render(encoder));
+            method::scatter(gpu, &mut **method, &frame, &output)?;
             results.push(read(gpu, scene, &output));
             self.bar.inc(1);
         }
-        let timed: Vec<(&dyn ScreenMethod, bool)> = methods
+        let timed: Vec<(&dyn ScreenMethod, &TextureView, bool)> = methods
             .iter()
             .map(|(name, setting, method)| {
                 let compared = COMPARED.contains(&(*name, setting.as_str()));
-                (method.as_ref(), compared)
+                (method.as_ref(), &output, compared)
             })
             .collect();
         let rounds = self.plan.rounds;
         self.begin(format!("{}: timing", scene.name), rounds.compared);
-        let times = clock::rounds(gpu, &timed, rounds, || self.bar.inc(1));
+        let times = clock::rounds(gpu, &timed, rounds, || self.bar.inc(1))?;
 
         if self.wanted("none") {
             let mut row = empty_row(scene, "none", "");
@@ -229,7 +226,7 @@ impl<'a> Lab<'a> {
         let mut images = images_of(&name, score, Knows::Mesh);
         let mut methods: Vec<(&str, u32, Box<dyn AtlasMethod>)> = Vec::new();
         for size in self.plan.atlases {
-            let ours = TextureSpace::new(&self.gpu.device, OUTPUT)?;
+            let ours = TextureSpace::new(&self.gpu.device, OUTPUT, &[Profile::SKIN])?;
             methods.push(("texture_separable", *size, Box::new(ours)));
             for (name, _, method) in rivals::atlas(&self.gpu.device, OUTPUT, &Profile::SKIN) {
                 // One timed run at one head is enough for the full convolution: it takes long.
@@ -299,7 +296,7 @@ impl<'a> Lab<'a> {
         let Plan { size, rounds, .. } = self.plan;
         self.begin("costs: warming up".into(), costs::SCENES.len());
         let scenes = costs::scenes(gpu, model, self.options.mm_per_unit, size)?;
-        let mut methods = Vec::new();
+        let (mut methods, mut outputs) = (Vec::new(), Vec::new());
         for scene in &scenes {
             let output = gpu.target("scattered", size, OUTPUT);
             // A method keeps one frame.
@@ -309,17 +306,18 @@ impl<'a> Lab<'a> {
                 *name != "screen_exact" && COMPARED.contains(&(*name, setting.as_str()))
             });
             for (.., method) in &mut of_scene {
-                method.prepare(&gpu.device, &scene.frame(&output))?;
-                gpu.run(|encoder| method.render(encoder));
+                method::scatter(gpu, &mut **method, &scene.frame(), &output)?;
             }
+            outputs.push(output);
             methods.push(of_scene);
             self.bar.inc(1);
         }
-        let all = methods.iter().flatten();
-        let timed: Vec<(&dyn ScreenMethod, bool)> =
-            all.map(|(.., method)| (method.as_ref(), true)).collect();
+        let mut timed: Vec<(&dyn ScreenMethod, &TextureView, bool)> = Vec::new();
+        for (of_scene, output) in methods.iter().zip(&outputs) {
+            timed.extend(of_scene.iter().map(|(.., m)| (m.as_ref(), output, true)));
+        }
         self.begin("costs: timing".into(), rounds.compared);
-        let times = clock::rounds(gpu, &timed, rounds, || self.bar.inc(1));
+        let times = clock::rounds(gpu, &timed, rounds, || self.bar.inc(1))?;
         let count = methods[0].len();
         let mut done = Done::default();
         for (s, scene) in scenes.iter().enumerate() {
@@ -354,10 +352,11 @@ impl<'a> Lab<'a> {
     pub fn heads(&self) -> Result<Done, Error> {
         self.begin("heads".into(), HEADS.len());
         let device = &self.gpu.device;
-        let mut screen = ScreenSpace::new(device, OUTPUT)?;
+        let exact = subsurface::Plan::exact(&[Profile::SKIN])?;
+        let mut screen = Ours::new(device, OUTPUT, &exact)?;
         let mut methods: Vec<(&str, u32, usize, Box<dyn AtlasMethod>)> = Vec::new();
         for (size, measured) in self.plan.atlases.iter().zip(self.plan.heads) {
-            let ours = TextureSpace::new(device, OUTPUT)?;
+            let ours = TextureSpace::new(device, OUTPUT, &[Profile::SKIN])?;
             methods.push(("texture_separable", *size, *measured, Box::new(ours)));
         }
         for (name, _, method) in rivals::atlas(device, OUTPUT, &Profile::SKIN) {

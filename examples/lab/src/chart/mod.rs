@@ -25,8 +25,8 @@ use std::hash::{DefaultHasher, Hasher};
 use std::process::ExitCode;
 use std::time::Instant;
 
+use crate::Error;
 use serde_json::json;
-use subsurface::Error;
 
 use crate::output;
 use crate::renderer::Scene as Model;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use subsurface::Error;
+use crate::Error;
 
 use crate::chart::clock::Rounds;
 

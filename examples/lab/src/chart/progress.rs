@@ -3,11 +3,11 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
+use crate::Error;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
-use subsurface::Error;
 
 use crate::chart::plot::Series;
 use crate::chart::report::SceneImages;

@@ -1,9 +1,10 @@
 //! What the methods are tried on: a frame as a host hands it over, and what its pixels show.
 
+use crate::Error;
 use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec3};
 use half::f16;
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Error, Profile, ScreenFrame};
+use subsurface::{Frame, Profile};
 
 use crate::renderer::{Camera, Gpu, Lighting, Primitive, Probe, Renderer, Scene as Model, View};
 use crate::truth::{Patch, Pixel, closed_form};
@@ -158,19 +159,12 @@ impl Scene {
     }
 
     /// As methods take it.
-    pub fn frame<'a>(&'a self, output: &'a TextureView) -> ScreenFrame<'a> {
-        ScreenFrame {
-            irradiance: &self.irradiance,
-            depth: &self.depth,
-            profile_id: Some(&self.profile_id),
-            normal: None,
-            strength: None,
-            viewport: None,
-            output,
-            projection: self.projection,
-            mm_per_unit: self.mm_per_unit,
-            profiles: &[Profile::SKIN],
-        }
+    pub fn frame(&self) -> Frame<'_> {
+        let projection = self.projection.to_cols_array_2d();
+        let mut frame = Frame::new(&self.irradiance, &self.depth, projection);
+        frame.profile_id = Some(&self.profile_id);
+        frame.mm_per_unit = self.mm_per_unit;
+        frame
     }
 
     /// Size of the pictures of the pixels that the truth is asked for.

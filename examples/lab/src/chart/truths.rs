@@ -4,9 +4,10 @@
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
+use crate::Error;
 use glam::Vec3;
 use indicatif::ProgressBar;
-use subsurface::{Error, Profile};
+use subsurface::Profile;
 
 use crate::chart::scene::{Head, Scene, Surface, vertices_mm};
 use crate::output;

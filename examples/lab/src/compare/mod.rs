@@ -11,15 +11,18 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use crate::Error;
 use glam::{Mat4, Vec3, Vec4};
 use image::RgbImage;
 use indicatif::{ProgressBar, ProgressStyle};
-use subsurface::{Error, Profile, ScreenFrame, ScreenSpace, TextureSpace, wgpu};
+use subsurface::{DEFAULT_MAX_ERROR, Plan, Profile, TextureSpace, wgpu};
+
+use crate::method::{self, Ours};
 
 use crate::metrics::{self, Layer};
 use crate::output;
 use crate::renderer::{
-    AtlasRenderer, Camera, GBuffer, Gpu, Layer as Shown, Lighting, Renderer, Scene, Specular, View,
+    AtlasRenderer, Camera, Gpu, Layer as Shown, Lighting, Renderer, Scene, Specular, View,
 };
 use report::{DIFFERENCE_GAIN, ModeReport, Report};
 
@@ -153,10 +156,7 @@ fn positive(input: &str, text: &str) -> Result<f32, Error> {
 fn profile(path: &str) -> Result<Profile, Error> {
     let text = std::fs::read_to_string(path)
         .map_err(|e| Error::new(path, format!("\"{e}\""), "a file that can be read"))?;
-    Profile::from_json(&text).map_err(|e| Error {
-        input: format!("{path}: {}", e.input),
-        ..e
-    })
+    Profile::from_json(&text).map_err(|e| Error::from(e).within(path))
 }
 
 /// A mode's scattered irradiance on the device, and what it cost.
@@ -206,7 +206,11 @@ fn compare(options: &Options) -> Result<(), Error> {
         ms: 0.0,
         atlas_ms: None,
     };
-    let screen = scatter_screen(&gpu, &renderer, &camera, options)?;
+    let plan = Plan::new(&[options.profile], DEFAULT_MAX_ERROR)?;
+    let exact = Plan::exact(&[options.profile])?;
+    let by = |mode, plan| scatter_screen(&gpu, &renderer, &camera, options, mode, plan);
+    let planned = by(("screen_planned", "screen space, a plan at 1/255"), &plan)?;
+    let exact = by(("screen_space", "screen space, exact"), &exact)?;
 
     step("scattering in texture space");
     let mut unavailable = Vec::new();
@@ -216,10 +220,10 @@ fn compare(options: &Options) -> Result<(), Error> {
         Ok(texture) => modes.push(texture),
         Err(error) => unavailable.push(("texture space", error.to_string())),
     }
-    modes.push(screen);
+    modes.extend([planned, exact]);
 
     step("measuring");
-    let frame = Frame::read(&gpu, &renderer, &camera, options);
+    let frame = Skin::read(&gpu, &renderer, &camera, options);
     let mm_per_texel = mm_per_texel(&scene, options);
     let finest = mm_per_texel
         .iter()
@@ -290,40 +294,23 @@ fn scatter_screen(
     renderer: &Renderer,
     camera: &Camera,
     options: &Options,
+    (name, title): (&'static str, &'static str),
+    plan: &Plan,
 ) -> Result<Scattered, Error> {
-    let GBuffer {
-        irradiance,
-        depth,
-        profile_id,
-        ..
-    } = &renderer.gbuffer;
     let output = renderer.scattered_target(gpu);
-    let mut effect = ScreenSpace::new(&gpu.device, output.texture().format())?;
+    let projection = camera.projection(options.size);
+    let frame = renderer.gbuffer.frame(projection, options.mm_per_unit);
+    let mut ours = Ours::new(&gpu.device, output.texture().format(), plan)?;
     let mut times = Vec::new();
     let timed = Instant::now();
     while more_runs(times.len(), timed) {
         let start = Instant::now();
-        effect.prepare(
-            &gpu.device,
-            &ScreenFrame {
-                irradiance,
-                depth,
-                profile_id: Some(profile_id),
-                normal: None,
-                strength: None,
-                viewport: None,
-                output: &output,
-                projection: camera.projection(options.size),
-                mm_per_unit: options.mm_per_unit,
-                profiles: &[options.profile],
-            },
-        )?;
-        gpu.run(|encoder| effect.render(encoder));
+        method::scatter(gpu, &mut ours, &frame, &output)?;
         times.push(start.elapsed().as_secs_f64() * 1e3);
     }
     Ok(Scattered {
-        name: "screen_space",
-        title: "screen space",
+        name,
+        title,
         view: output,
         runs: times.len(),
         ms: median(&mut times),
@@ -339,7 +326,8 @@ fn scatter_texture(
     options: &Options,
 ) -> Result<Scattered, Error> {
     let output = renderer.scattered_target(gpu);
-    let mut effect = TextureSpace::new(&gpu.device, output.texture().format())?;
+    let format = output.texture().format();
+    let mut effect = TextureSpace::new(&gpu.device, format, &[options.profile])?;
     let (mut raster, mut blur, mut both) = (Vec::new(), Vec::new(), Vec::new());
     let timed = Instant::now();
     while more_runs(both.len(), timed) {
@@ -347,13 +335,12 @@ fn scatter_texture(
         let raster_ms = atlas.render(
             gpu,
             renderer,
-            &[options.profile],
+            1,
             options.mm_per_unit,
             &output,
-            |atlas| {
+            |atlas, to| {
                 let start = Instant::now();
-                effect.prepare(&gpu.device, atlas)?;
-                gpu.run(|encoder| effect.render(encoder));
+                method::scatter_atlas(gpu, &mut effect, atlas, to)?;
                 blur_ms += start.elapsed().as_secs_f64() * 1e3;
                 Ok(())
             },
@@ -382,14 +369,14 @@ fn median(values: &mut [f64]) -> f64 {
 }
 
 /// What the measures need of the G-buffer.
-struct Frame {
+struct Skin {
     skin: Vec<bool>,
     /// Surface area that a pixel shows, up to a common factor.
     area: Vec<f64>,
     albedo: Vec<Vec3>,
 }
 
-impl Frame {
+impl Skin {
     fn read(gpu: &Gpu, renderer: &Renderer, camera: &Camera, options: &Options) -> Self {
         let g = &renderer.gbuffer;
         let skin: Vec<bool> = gpu
@@ -471,7 +458,7 @@ struct Measured {
 fn measure(
     gpu: &Gpu,
     renderer: &Renderer,
-    frame: &Frame,
+    frame: &Skin,
     modes: &[Scattered],
     options: &Options,
 ) -> Measured {

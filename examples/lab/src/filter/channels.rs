@@ -4,11 +4,11 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
+use crate::Error;
 use exr::block::reader::Reader;
 use exr::meta::attribute::{SampleType, Text};
 use exr::meta::header::Header;
 use exr::prelude::{ReadChannels as _, ReadLayers as _, ReadSpecificChannel as _, Vec2, read};
-use subsurface::Error;
 
 /// What red, green and blue are called: channels of colours, and of vectors.
 pub const RGB: [[&str; 3]; 1] = [["R", "G", "B"]];

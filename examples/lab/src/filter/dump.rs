@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::Error;
 use glam::{DMat4, Mat4};
 use serde::Deserialize;
-use subsurface::Error;
 
 use crate::filter::channels::{self, Pixels};
 
@@ -90,10 +90,7 @@ impl Camera {
 
     /// What is wrong with it, with the file's name.
     pub fn error(&self, error: Error) -> Error {
-        Error {
-            input: format!("{}: {}", self.path.display(), error.input),
-            ..error
-        }
+        error.within(self.path.display())
     }
 
     fn file(&self, path: &Path) -> PathBuf {

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::Error;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
     f16,
@@ -10,7 +11,6 @@ use exr::prelude::{
 use glam::Mat4;
 use glam::camera::rh::proj::directx::perspective_infinite_reverse;
 use serde_json::{Value, json};
-use subsurface::Error;
 
 use crate::filter::options::Options;
 

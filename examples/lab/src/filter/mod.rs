@@ -20,9 +20,12 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use crate::Error;
 use indicatif::{ProgressBar, ProgressStyle};
 use subsurface::wgpu::{self, TextureFormat};
-use subsurface::{Error, Normals, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace};
+use subsurface::{Frame, Plan};
+
+use crate::method::{self, Ours};
 
 use crate::output;
 use crate::renderer::Gpu;
@@ -64,15 +67,11 @@ fn filter(options: &Options) -> Result<(), Error> {
     step("planning");
     let plan = match options.max_error {
         None => Plan::exact(&options.profiles)?,
-        Some(max_error) => Plan::new(&options.profiles, max_error).map_err(|e| Error {
-            input: "--max-error".into(),
-            ..e
-        })?,
+        Some(max_error) => Plan::new(&options.profiles, max_error)?,
     };
 
     step("scattering");
-    let exact = options.max_error.is_none();
-    let scattered = scatter(&gpu, &dump, &options.profiles, (!exact).then_some(&plan))?;
+    let scattered = scatter(&gpu, &dump, &plan)?;
 
     step("writing");
     let files = files(options, &dump, &scattered)?;
@@ -103,13 +102,8 @@ fn filter(options: &Options) -> Result<(), Error> {
     Ok(())
 }
 
-/// The scattered irradiance; what lay there where nothing scatters. Without a plan by the exact effect.
-fn scatter(
-    gpu: &Gpu,
-    dump: &Dump,
-    profiles: &[Profile],
-    plan: Option<&Plan>,
-) -> Result<Vec<[f32; 3]>, Error> {
+/// The scattered irradiance; what lay there where nothing scatters.
+fn scatter(gpu: &Gpu, dump: &Dump, plan: &Plan) -> Result<Vec<[f32; 3]>, Error> {
     // As wide as the files, so that what does not scatter comes out bit for bit.
     let format = TextureFormat::Rgba32Float;
     let size = dump.camera.size;
@@ -119,38 +113,15 @@ fn scatter(
     let invalid = device.push_error_scope(wgpu::ErrorFilter::Validation);
     let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
     let output = gpu.target("scattered", size, format);
-    let normals = dump.normal.as_ref();
-    let normals = normals.map(|texels| gpu.upload("normal", size, format, texels));
-    let frame = ScreenFrame {
-        irradiance: &gpu.upload("irradiance", size, format, &dump.irradiance),
-        depth: &gpu.upload("depth", size, TextureFormat::R32Float, &dump.depth),
-        profile_id: Some(&gpu.upload("profile id", size, TextureFormat::R8Uint, &dump.profile_id)),
-        normal: normals.as_ref().map(|texture| Normals {
-            texture,
-            to_view: glam::Mat3::IDENTITY,
-        }),
-        strength: None,
-        viewport: None,
-        output: &output,
-        projection: dump.camera.projection,
-        mm_per_unit: dump.camera.mm_per_unit,
-        profiles,
-    };
-    let of_camera = |e| dump.camera.error(e);
-    match plan {
-        None => {
-            let mut effect = ScreenSpace::new(device, format)?;
-            effect.prepare(device, &frame).map_err(of_camera)?;
-            gpu.run(|encoder| effect.render(encoder));
-        }
-        Some(plan) => {
-            let mut effect = PlannedScreenSpace::new(device, format)?;
-            effect
-                .prepare(device, &gpu.queue, &frame, plan)
-                .map_err(of_camera)?;
-            gpu.run(|encoder| effect.render(encoder));
-        }
-    }
+    let irradiance = gpu.upload("irradiance", size, format, &dump.irradiance);
+    let depth = gpu.upload("depth", size, TextureFormat::R32Float, &dump.depth);
+    let profile_id = gpu.upload("profile id", size, TextureFormat::R8Uint, &dump.profile_id);
+    let projection = dump.camera.projection.to_cols_array_2d();
+    let mut frame = Frame::new(&irradiance, &depth, projection);
+    frame.profile_id = Some(&profile_id);
+    frame.mm_per_unit = dump.camera.mm_per_unit;
+    let mut ours = Ours::new(device, format, plan)?;
+    method::scatter(gpu, &mut ours, &frame, &output).map_err(|e| dump.camera.error(e))?;
     // Innermost first.
     let failed = pollster::block_on(memory.pop());
     let failed = failed.or(pollster::block_on(invalid.pop()));
@@ -158,7 +129,7 @@ fn scatter(
         let [width, height] = size;
         let got = format!("{width}x{height}, where the device says \"{error}\"");
         let needs = "a frame that the device has memory for";
-        return Err(of_camera(Error::new("size", got, needs)));
+        return Err(dump.camera.error(Error::new("size", got, needs)));
     }
     let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&gpu.read_bytes(output.texture()));
     Ok(texels.iter().map(|&[r, g, b, _]| [r, g, b]).collect())

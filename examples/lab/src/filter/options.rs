@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use subsurface::{DEFAULT_MAX_ERROR, Error, Gaussian, MAX_PROFILES, Profile};
+use crate::Error;
+use subsurface::{DEFAULT_MAX_ERROR, Gaussian, MAX_PROFILES, Profile};
 
 const HELP: &str = "\
 Scatters a frame that another program dumped; docs/dumps.md says how to write one.
@@ -125,10 +126,7 @@ fn profile(name: &str) -> Result<Profile, Error> {
     }
     let text = std::fs::read_to_string(name)
         .map_err(|e| Error::new(name, format!("\"{e}\""), "skin, or a file that can be read"))?;
-    Profile::from_json(&text).map_err(|e| Error {
-        input: format!("{name}: {}", e.input),
-        ..e
-    })
+    Profile::from_json(&text).map_err(|e| Error::from(e).within(name))
 }
 
 fn scaled(profile: &Profile, variance_scale: f32) -> Result<Profile, Error> {
@@ -136,8 +134,6 @@ fn scaled(profile: &Profile, variance_scale: f32) -> Result<Profile, Error> {
         variance_mm2: g.variance_mm2 * variance_scale,
         ..*g
     });
-    Profile::new(&gaussians.collect::<Vec<_>>()).map_err(|e| Error {
-        input: format!("--variance-scale: {}", e.input),
-        ..e
-    })
+    Profile::new(&gaussians.collect::<Vec<_>>())
+        .map_err(|e| Error::from(e).within("--variance-scale"))
 }

@@ -2,11 +2,11 @@
 
 use std::fs;
 
+use crate::Error;
 use exr::prelude::{Compression, Encoding};
 use proptest::collection::vec;
 use proptest::prelude::*;
 use serde_json::{Value, json};
-use subsurface::Error;
 
 use crate::damage::{Damage, Lie, config};
 use crate::filter::dump::{Camera, Dump};

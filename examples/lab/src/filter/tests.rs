@@ -12,7 +12,7 @@ use glam::camera::rh::proj::directx::{perspective, perspective_infinite_reverse}
 use glam::{DVec3, Mat4};
 use serde_json::json;
 use subsurface::wgpu::TextureFormat;
-use subsurface::{Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace};
+use subsurface::{Frame, Plan, Profile, ScreenSpace, View};
 
 use crate::filter::dump::write_depth;
 use crate::filter::fixture::{

@@ -4,7 +4,8 @@
 
 use std::time::Instant;
 
-use subsurface::{Atlas, Error, Profile, TextureSpace};
+use crate::Error;
+use subsurface::{Atlas, TextureSpace};
 use wgpu::TextureFormat;
 
 use super::{Gpu, IRRADIANCE, Pipeline, Renderer, mesh::Mesh};
@@ -149,8 +150,8 @@ impl AtlasRenderer {
     }
 
     /// Has the scene scattered as `renderer` last lit it and draws the result into `output`, which
-    /// elsewhere takes the irradiance as it was. `scatter` fills the output of the atlas that it is
-    /// handed, of `output`'s format, and waits for it. Returns the wall time of drawing and lighting
+    /// elsewhere takes the irradiance as it was; primitives of the first `profiles` ids scatter. `scatter` fills
+    /// the texture that it is handed beside an atlas, of `output`'s format, and waits for it. Returns the wall time of drawing and lighting
     /// the atlases, submit and wait, in ms; that of `scatter` is the caller's to take.
     ///
     /// # Errors
@@ -159,12 +160,12 @@ impl AtlasRenderer {
         &self,
         gpu: &Gpu,
         renderer: &Renderer,
-        profiles: &[Profile],
+        profiles: usize,
         mm_per_unit: f32,
         output: &wgpu::TextureView,
-        mut scatter: impl FnMut(&Atlas) -> Result<(), Error>,
+        mut scatter: impl FnMut(&Atlas, &wgpu::TextureView) -> Result<(), Error>,
     ) -> Result<f64, Error> {
-        let scatters = 1..=profiles.len();
+        let scatters = 1..=profiles;
         let skin = || {
             let meshes = renderer.meshes.iter();
             meshes.filter(|m| scatters.contains(&m.profile_id.into()))
@@ -190,13 +191,12 @@ impl AtlasRenderer {
                 gpu.run(|encoder| self.draw_atlas(encoder, renderer, mesh, page.clone()));
                 raster_ms += start.elapsed().as_secs_f64() * 1e3;
 
-                scatter(&Atlas {
+                let atlas = Atlas {
                     irradiance: &self.irradiance,
                     positions: &self.positions,
-                    output: &self.scattered,
                     mm_per_unit,
-                    profiles,
-                })?;
+                };
+                scatter(&atlas, &self.scattered)?;
 
                 gpu.run(|encoder| self.draw_screen(encoder, renderer, mesh, page.clone(), output));
             }

@@ -2,9 +2,9 @@
 
 use std::str::FromStr;
 
+use crate::Error;
 use glam::camera::rh::proj::directx::perspective_infinite_reverse;
 use glam::{Mat4, Quat, Vec3};
-use subsurface::Error;
 
 use super::Scene;
 

@@ -3,7 +3,7 @@
 use wgpu::util::{DeviceExt, TextureBlitter};
 use wgpu::{TextureFormat, TextureUsages, TextureView};
 
-use subsurface::Error;
+use crate::Error;
 
 /// A headless device, at WebGPU's default limits and without any feature: what the effects need
 /// at most.
@@ -126,12 +126,13 @@ impl Gpu {
         })
     }
 
-    /// Submits what `record` records and waits until it is done.
-    pub fn run(&self, record: impl FnOnce(&mut wgpu::CommandEncoder)) {
+    /// Submits what `record` records and waits until it is done. Returns what that returns.
+    pub fn run<T>(&self, record: impl FnOnce(&mut wgpu::CommandEncoder) -> T) -> T {
         let mut encoder = self.device.create_command_encoder(&Default::default());
-        record(&mut encoder);
+        let result = record(&mut encoder);
         self.queue.submit([encoder.finish()]);
         self.wait();
+        result
     }
 
     /// The pixels of a float texture, row by row, red to alpha.

@@ -4,9 +4,9 @@
 use std::f32::consts::PI;
 use std::str::FromStr;
 
+use crate::Error;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3, Vec4};
-use subsurface::Error;
 
 use super::mesh::Mesh;
 use super::{DEPTH, Gpu};

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
+use crate::Error;
 use bytemuck::{Pod, Zeroable};
-use subsurface::Error;
 use wgpu::util::DeviceExt;
 
 use super::scene::{Image, Scene, Vertex};

@@ -21,9 +21,10 @@ pub use lighting::{Light, Lighting, Sky, Specular};
 pub use probe::Probe;
 pub use scene::{Image, Material, Primitive, Scene, Vertex};
 
+use crate::Error;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
-use subsurface::Error;
+use subsurface::Frame;
 use wgpu::{TextureFormat, TextureView};
 
 use lighting::Lights;
@@ -48,6 +49,17 @@ pub struct GBuffer {
     pub irradiance: TextureView,
     /// Surface reflection. Rgba16Float.
     pub specular: TextureView,
+}
+
+impl GBuffer {
+    /// As the effects take it: with ids, whatever else a frame may have at its default.
+    pub fn frame(&self, projection: Mat4, mm_per_unit: f32) -> Frame<'_> {
+        let projection = projection.to_cols_array_2d();
+        let mut frame = Frame::new(&self.irradiance, &self.depth, projection);
+        frame.profile_id = Some(&self.profile_id);
+        frame.mm_per_unit = mm_per_unit;
+        frame
+    }
 }
 
 /// What [`Renderer::compose`] shows.

@@ -9,6 +9,7 @@ use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::path::Path;
 
+use crate::Error;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
 use gltf::Semantic;
@@ -16,7 +17,6 @@ use gltf::accessor::{DataType, Dimensions, Iter};
 use gltf::json::validation::Validate;
 use gltf::material::AlphaMode;
 use gltf::mesh::Mode;
-use subsurface::Error;
 
 use super::pages::paginate;
 

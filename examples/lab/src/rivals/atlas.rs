@@ -1,12 +1,13 @@
 //! What the atlas rivals share: the texels' points, and the gutter around the islands. Driver of
 //! `atlas.wgsl` and `gutter.wgsl`.
 
+use crate::Error;
 use glam::Vec4;
+use subsurface::Atlas;
 use subsurface::wgpu::util::DeviceExt;
 use subsurface::wgpu::{
     self, BindGroup, BindingResource, Buffer, CommandEncoder, Device, TextureFormat, TextureView,
 };
-use subsurface::{Atlas, Error};
 
 use super::pass::{Pass, Slot, TRIANGLE, size};
 
@@ -16,15 +17,13 @@ pub const ATLAS: &str = concat!(include_str!("triangle.wgsl"), include_str!("atl
 /// The uniform of `atlas.wgsl`.
 pub fn uniform(device: &Device, atlas: &Atlas) -> Result<Buffer, Error> {
     let [width, height] = size(atlas.irradiance);
-    for (input, view) in [("positions", atlas.positions), ("output", atlas.output)] {
-        if size(view) != [width, height] {
-            let got = size(view);
-            return Err(Error::new(
-                format!("{input}: size"),
-                format!("{}x{}", got[0], got[1]),
-                format!("{width}x{height} as the irradiance has"),
-            ));
-        }
+    let got = size(atlas.positions);
+    if got != [width, height] {
+        return Err(Error::new(
+            "positions: size",
+            format!("{}x{}", got[0], got[1]),
+            format!("{width}x{height} as the irradiance has"),
+        ));
     }
     if !atlas.mm_per_unit.is_finite() || atlas.mm_per_unit <= 0.0 {
         return Err(Error::new(
@@ -45,7 +44,7 @@ pub fn uniform(device: &Device, atlas: &Atlas) -> Result<Buffer, Error> {
 /// The last pass.
 pub struct Gutter {
     pass: Pass,
-    prepared: Option<(BindGroup, TextureView)>,
+    prepared: Option<BindGroup>,
 }
 
 impl Gutter {
@@ -74,11 +73,11 @@ impl Gutter {
                 BindingResource::TextureView(atlas.irradiance),
             ],
         );
-        self.prepared = Some((group, atlas.output.clone()));
+        self.prepared = Some(group);
     }
 
-    pub fn render(&self, encoder: &mut CommandEncoder) {
-        if let Some((group, output)) = &self.prepared {
+    pub fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) {
+        if let Some(group) = &self.prepared {
             self.pass.draw(encoder, group, &[output]);
         }
     }

@@ -8,11 +8,12 @@
 use std::f64::consts::PI;
 use std::fmt::Write;
 
+use crate::Error;
 use glam::DVec3;
 use subsurface::wgpu::{
-    BindGroup, BindingResource, CommandEncoder, Device, TextureFormat, TextureView,
+    BindGroup, BindingResource, CommandEncoder, Device, Queue, TextureFormat, TextureView,
 };
-use subsurface::{Error, Profile, ScreenFrame};
+use subsurface::{Frame, Profile};
 
 use super::edge::{distances_mm, minimise, scattered_step, terms, vec3f};
 use super::packed::{PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN};
@@ -69,7 +70,7 @@ pub struct BurleyDisk {
     disk: Pass,
     samples: usize,
     widest_per_mm: f64,
-    prepared: Option<(BindGroup, TextureView)>,
+    prepared: Option<BindGroup>,
 }
 
 impl BurleyDisk {
@@ -125,7 +126,7 @@ fn samples_wgsl(shape: DVec3, samples: usize) -> String {
 }
 
 impl ScreenMethod for BurleyDisk {
-    fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<(), Error> {
+    fn prepare(&mut self, device: &Device, _: &Queue, frame: &Frame) -> Result<(), Error> {
         let inputs = self.packed.prepare(device, frame)?;
         let group = self.disk.bind(
             device,
@@ -136,15 +137,16 @@ impl ScreenMethod for BurleyDisk {
                 BindingResource::TextureView(frame.irradiance),
             ],
         );
-        self.prepared = Some((group, frame.output.clone()));
+        self.prepared = Some(group);
         Ok(())
     }
 
-    fn render(&self, encoder: &mut CommandEncoder) {
-        if let Some((group, output)) = &self.prepared {
-            self.packed.render(encoder);
+    fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
+        if let Some(group) = &self.prepared {
+            self.packed.render(encoder, output);
             self.disk.draw(encoder, group, &[output]);
         }
+        Ok(())
     }
 
     /// Color and surface for each sample, the pixel's surface and the alpha that is kept.

@@ -1,17 +1,18 @@
 //! No scattering: one read and one write a pixel, the unit that the chart measures time in. Driver
 //! of `copy.wgsl`.
 
+use crate::Error;
+use subsurface::Frame;
 use subsurface::wgpu::{
-    BindGroup, BindingResource, CommandEncoder, Device, TextureFormat, TextureView,
+    BindGroup, BindingResource, CommandEncoder, Device, Queue, TextureFormat, TextureView,
 };
-use subsurface::{Error, ScreenFrame};
 
 use super::pass::{Pass, Slot, TRIANGLE};
 use crate::method::ScreenMethod;
 
 pub struct Copy {
     pass: Pass,
-    prepared: Option<(BindGroup, TextureView)>,
+    prepared: Option<BindGroup>,
 }
 
 impl Copy {
@@ -31,17 +32,18 @@ impl Copy {
 }
 
 impl ScreenMethod for Copy {
-    fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<(), Error> {
+    fn prepare(&mut self, device: &Device, _: &Queue, frame: &Frame) -> Result<(), Error> {
         let irradiance = BindingResource::TextureView(frame.irradiance);
         let group = self.pass.bind(device, &[irradiance]);
-        self.prepared = Some((group, frame.output.clone()));
+        self.prepared = Some(group);
         Ok(())
     }
 
-    fn render(&self, encoder: &mut CommandEncoder) {
-        if let Some((group, output)) = &self.prepared {
+    fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
+        if let Some(group) = &self.prepared {
             self.pass.draw(encoder, group, &[output]);
         }
+        Ok(())
     }
 
     fn fetches(&self, _px_per_mm: f64) -> Option<f64> {

@@ -13,7 +13,8 @@ const SOFT_MM2: f64 = 0.0625;
 
 /// The profile in double precision.
 pub fn terms(profile: &Profile) -> Vec<(f64, DVec3)> {
-    let term = |g: &subsurface::Gaussian| (g.variance_mm2.into(), g.weight.as_dvec3());
+    let term =
+        |g: &subsurface::Gaussian| (g.variance_mm2.into(), DVec3::from(g.weight.map(f64::from)));
     profile.gaussians().iter().map(term).collect()
 }
 

@@ -4,12 +4,13 @@
 //! J. Jimenez, V. Sundstedt, D. Gutierrez. *Screen-space perceptual rendering of human skin.* ACM
 //! Transactions on Applied Perception 6(4), 2009.
 
+use crate::Error;
 use glam::DVec3;
+use subsurface::Frame;
 use subsurface::wgpu::{
     self, BindGroup, BindingResource, BlendFactor, Color, ColorWrites, CommandEncoder, Device,
-    LoadOp, Sampler, TextureFormat, TextureView,
+    LoadOp, Queue, Sampler, TextureFormat, TextureView,
 };
-use subsurface::{Error, ScreenFrame};
 
 use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN};
 use super::pass::{CLEAR, Pass, Slot, Target, linear_sampler, scratch, size};
@@ -44,7 +45,6 @@ struct Prepared {
     /// For each blur, along rows and along columns.
     groups: Vec<(BindGroup, BindGroup)>,
     color: TextureView,
-    output: TextureView,
 }
 
 impl Jimenez2009 {
@@ -118,7 +118,7 @@ impl Jimenez2009 {
 }
 
 impl ScreenMethod for Jimenez2009 {
-    fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<(), Error> {
+    fn prepare(&mut self, device: &Device, _: &Queue, frame: &Frame) -> Result<(), Error> {
         let inputs = self.packed.prepare(device, frame)?;
         let size = size(frame.irradiance);
         let label = "rivals jimenez_2009 rows";
@@ -143,22 +143,22 @@ impl ScreenMethod for Jimenez2009 {
         self.prepared = Some(Prepared {
             groups,
             color: inputs.color,
-            output: frame.output.clone(),
         });
         Ok(())
     }
 
-    fn render(&self, encoder: &mut CommandEncoder) {
+    fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
         let (Some([rows]), Some(prepared)) = (&self.scratch, &self.prepared) else {
-            return;
+            return Ok(());
         };
-        self.packed.render(encoder);
+        self.packed.render(encoder, output);
         for (blur, (row_group, column_group)) in self.blurs.iter().zip(&prepared.groups) {
             blur.rows.draw(encoder, row_group, &[rows]);
-            let targets = [(&prepared.color, CLEAR), (&prepared.output, LoadOp::Load)];
+            let targets = [(&prepared.color, CLEAR), (output, LoadOp::Load)];
             blur.columns
                 .draw_onto(encoder, column_group, &targets, blur.share);
         }
+        Ok(())
     }
 
     /// Seven taps and the surface, six times.

@@ -18,8 +18,9 @@ mod tests;
 mod texture_2d;
 mod texture_cascade;
 
+use crate::Error;
+use subsurface::Profile;
 use subsurface::wgpu::{Device, TextureFormat};
-use subsurface::{Error, Profile};
 
 use crate::method::{AtlasMethod, ScreenMethod};
 

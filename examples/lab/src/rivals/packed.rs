@@ -1,11 +1,12 @@
 //! A frame as the screen-space rivals read it. Driver of `packed.wgsl`.
 
+use crate::Error;
 use glam::Vec4;
+use subsurface::Frame;
 use subsurface::wgpu::util::DeviceExt;
 use subsurface::wgpu::{
     self, BindGroup, Buffer, CommandEncoder, Device, TextureFormat, TextureView,
 };
-use subsurface::{Error, ScreenFrame};
 
 use super::pass::{Pass, Slot, Target, scratch, size};
 
@@ -29,7 +30,7 @@ pub struct Packed {
     /// Whether the pass writes the irradiance to the output, too.
     copies: bool,
     scratch: Option<[TextureView; 2]>,
-    prepared: Option<(BindGroup, TextureView)>,
+    prepared: Option<BindGroup>,
 }
 
 /// What [`Packed::prepare`] leaves for the passes behind it.
@@ -59,7 +60,7 @@ impl Packed {
         }
     }
 
-    pub fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<Inputs, Error> {
+    pub fn prepare(&mut self, device: &Device, frame: &Frame) -> Result<Inputs, Error> {
         let (Some(profile_id), None, None) = (frame.profile_id, frame.strength, frame.viewport)
         else {
             return Err(Error::new(
@@ -89,7 +90,7 @@ impl Packed {
                 wgpu::BindingResource::TextureView(profile_id),
             ],
         );
-        self.prepared = Some((group, frame.output.clone()));
+        self.prepared = Some(group);
         let [color, surface] = self.scratch.insert(views).clone();
         Ok(Inputs {
             frame: uniform,
@@ -98,8 +99,9 @@ impl Packed {
         })
     }
 
-    pub fn render(&self, encoder: &mut CommandEncoder) {
-        if let (Some((group, output)), Some([color, surface])) = (&self.prepared, &self.scratch) {
+    /// `output` is where the irradiance goes, if anywhere.
+    pub fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) {
+        if let (Some(group), Some([color, surface])) = (&self.prepared, &self.scratch) {
             let mut targets = vec![color, surface];
             if self.copies {
                 targets.push(output);
@@ -111,15 +113,11 @@ impl Packed {
 
 /// `frame` of the shaders. With clip z and w linear in view z, depth d = (P₂₂z + P₂₃)/(P₃₂z + P₃₃)
 /// solves to z = (P₂₃ − d·P₃₃)/(d·P₃₂ − P₂₂), and a pixel is 2|w|/(W·P₀₀) wide.
-fn uniform(frame: &ScreenFrame, profile_id: &wgpu::TextureView) -> Result<[Vec4; 2], Error> {
-    let p = frame.projection;
+fn uniform(frame: &Frame, profile_id: &wgpu::TextureView) -> Result<[Vec4; 2], Error> {
+    let p = glam::Mat4::from_cols_array_2d(&frame.projection);
     let mm = frame.mm_per_unit;
     let size = size(frame.irradiance);
-    for (input, view) in [
-        ("depth", frame.depth),
-        ("profile_id", profile_id),
-        ("output", frame.output),
-    ] {
+    for (input, view) in [("depth", frame.depth), ("profile_id", profile_id)] {
         let [width, height] = self::size(view);
         if [width, height] != size {
             return Err(Error::new(

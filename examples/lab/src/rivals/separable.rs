@@ -6,11 +6,12 @@
 
 use std::fmt::Write;
 
+use crate::Error;
 use glam::DVec3;
 use subsurface::wgpu::{
-    BindGroup, BindingResource, CommandEncoder, Device, Sampler, TextureFormat, TextureView,
+    BindGroup, BindingResource, CommandEncoder, Device, Queue, Sampler, TextureFormat, TextureView,
 };
-use subsurface::{Error, Profile, ScreenFrame};
+use subsurface::{Frame, Profile};
 
 use super::edge::{Responses, minimise, step, terms, vec3f};
 use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN};
@@ -201,7 +202,7 @@ pub struct Separable {
     linear: Sampler,
     taps: usize,
     scratch: Option<[TextureView; 1]>,
-    prepared: Option<(BindGroup, BindGroup, TextureView)>,
+    prepared: Option<(BindGroup, BindGroup)>,
 }
 
 impl Separable {
@@ -254,7 +255,7 @@ impl Kernel {
 }
 
 impl ScreenMethod for Separable {
-    fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<(), Error> {
+    fn prepare(&mut self, device: &Device, _: &Queue, frame: &Frame) -> Result<(), Error> {
         let inputs = self.packed.prepare(device, frame)?;
         let size = size(frame.irradiance);
         let label = "rivals separable rows";
@@ -272,23 +273,17 @@ impl ScreenMethod for Separable {
                 ],
             )
         };
-        self.prepared = Some((
-            bind(&self.rows, &inputs.color),
-            bind(&self.columns, rows),
-            frame.output.clone(),
-        ));
+        self.prepared = Some((bind(&self.rows, &inputs.color), bind(&self.columns, rows)));
         Ok(())
     }
 
-    fn render(&self, encoder: &mut CommandEncoder) {
-        let (Some([rows]), Some((row_group, column_group, output))) =
-            (&self.scratch, &self.prepared)
-        else {
-            return;
-        };
-        self.packed.render(encoder);
-        self.rows.draw(encoder, row_group, &[rows]);
-        self.columns.draw(encoder, column_group, &[output]);
+    fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
+        if let (Some([rows]), Some((row_group, column_group))) = (&self.scratch, &self.prepared) {
+            self.packed.render(encoder, output);
+            self.rows.draw(encoder, row_group, &[rows]);
+            self.columns.draw(encoder, column_group, &[output]);
+        }
+        Ok(())
     }
 
     /// Color and surface for each tap of both passes, and the alpha that is kept.

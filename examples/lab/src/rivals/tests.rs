@@ -4,11 +4,11 @@
 use std::collections::HashMap;
 
 use glam::{DVec2, DVec3, DVec4, Mat4, Vec4};
-use subsurface::wgpu::{CommandEncoder, TextureFormat};
-use subsurface::{Atlas, Profile, ScreenFrame, ScreenSpace, TextureSpace};
+use subsurface::wgpu::TextureFormat;
+use subsurface::{Atlas, Frame, Plan, Profile, TextureSpace};
 
 use super::edge::{scattered_step, step, terms};
-use crate::method::{AtlasMethod, ScreenMethod};
+use crate::method::{self, AtlasMethod, Ours, ScreenMethod};
 use crate::renderer::Gpu;
 
 const FORMAT: TextureFormat = TextureFormat::Rgba16Float;
@@ -91,20 +91,13 @@ impl View {
         let id: Vec<_> = hits.iter().map(|h| h.id).collect();
         let size = self.size;
         let output = gpu.target("output", size, FORMAT);
-        let frame = ScreenFrame {
-            irradiance: &gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &irradiance),
-            depth: &gpu.upload("depth", size, TextureFormat::R32Float, &depth),
-            profile_id: Some(&gpu.upload("profile id", size, TextureFormat::R8Uint, &id)),
-            normal: None,
-            strength: None,
-            viewport: None,
-            output: &output,
-            projection: self.projection,
-            mm_per_unit: 1.0,
-            profiles: &[Profile::SKIN],
-        };
-        method.prepare(&gpu.device, &frame).unwrap();
-        gpu.run(|encoder: &mut CommandEncoder| method.render(encoder));
+        let irradiance = gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &irradiance);
+        let depth = gpu.upload("depth", size, TextureFormat::R32Float, &depth);
+        let id = gpu.upload("profile id", size, TextureFormat::R8Uint, &id);
+        let mut frame = Frame::new(&irradiance, &depth, self.projection.to_cols_array_2d());
+        frame.profile_id = Some(&id);
+        frame.mm_per_unit = 1.0;
+        method::scatter(gpu, method, &frame, &output).unwrap();
         gpu.read(&output)
     }
 }
@@ -202,7 +195,8 @@ fn edge_error(method: &mut dyn ScreenMethod, px_per_mm: f64, degrees: f64) -> (f
 fn rivals_beat_no_scattering_on_an_edge() {
     let mut none: HashMap<String, f64> = HashMap::new();
     let mut methods = rivals();
-    let ours = ScreenSpace::new(&gpu().device, FORMAT).unwrap();
+    let exact = Plan::exact(&[Profile::SKIN]).unwrap();
+    let ours = Ours::new(&gpu().device, FORMAT, &exact).unwrap();
     methods.push(("subsurface", String::new(), Box::new(ours)));
     for (name, setting, mut method) in methods {
         let mut line = format!("{name} {setting}");
@@ -360,12 +354,9 @@ fn scatter_atlas(
     let atlas = Atlas {
         irradiance: &gpu.upload("irradiance", [size; 2], floats, &irradiance),
         positions: &gpu.upload("positions", [size; 2], floats, &positions),
-        output: &output,
         mm_per_unit: 1000.0,
-        profiles: &[Profile::SKIN],
     };
-    method.prepare(&gpu.device, &atlas).unwrap();
-    gpu.run(|encoder| method.render(encoder));
+    method::scatter_atlas(gpu, method, &atlas, &output).unwrap();
     gpu.read(&output)
 }
 
@@ -408,7 +399,7 @@ fn atlas_rivals_beat_no_scattering_on_an_edge() {
     ];
     let skin = terms(&Profile::SKIN);
     let mut methods = super::atlas(&gpu().device, FORMAT, &Profile::SKIN);
-    let ours = TextureSpace::new(&gpu().device, FORMAT).unwrap();
+    let ours = TextureSpace::new(&gpu().device, FORMAT, &[Profile::SKIN]).unwrap();
     methods.push(("subsurface", String::new(), Box::new(ours)));
     for (name, _, mut method) in methods {
         for (patch, u, v) in patches {

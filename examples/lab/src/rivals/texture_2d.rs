@@ -4,10 +4,11 @@
 //! P. Li, Y. Shao. *GPU-based face rendering via the physical model of light interaction with human
 //! skin.* 2015.
 
+use crate::Error;
 use subsurface::wgpu::{
-    BindGroup, BindingResource, CommandEncoder, Device, TextureFormat, TextureView,
+    BindGroup, BindingResource, CommandEncoder, Device, Queue, TextureFormat, TextureView,
 };
-use subsurface::{Atlas, Error, Profile};
+use subsurface::{Atlas, Profile};
 
 use super::atlas::{ATLAS, Gutter, uniform};
 use super::edge::terms;
@@ -71,7 +72,7 @@ impl Texture2d {
 }
 
 impl AtlasMethod for Texture2d {
-    fn prepare(&mut self, device: &Device, atlas: &Atlas) -> Result<(), Error> {
+    fn prepare(&mut self, device: &Device, _: &Queue, atlas: &Atlas) -> Result<(), Error> {
         let uniform = uniform(device, atlas)?;
         let size = size(atlas.irradiance);
         let label = "rivals texture_2d";
@@ -103,18 +104,19 @@ impl AtlasMethod for Texture2d {
         Ok(())
     }
 
-    fn render(&self, encoder: &mut CommandEncoder) {
+    fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
         let (Some([source, even, odd]), Some((source_group, groups))) =
             (&self.scratch, &self.prepared)
         else {
-            return;
+            return Ok(());
         };
         self.source.draw(encoder, source_group, &[source]);
         let targets = [odd, even].into_iter().cycle();
         for ((pass, group), target) in self.sums.iter().zip(groups).zip(targets) {
             pass.draw(encoder, group, &[target]);
         }
-        self.gutter.render(encoder);
+        self.gutter.render(encoder, output);
+        Ok(())
     }
 
     fn scratch_bytes_per_texel(&self) -> f64 {

@@ -6,11 +6,12 @@
 
 use std::fmt::Write;
 
+use crate::Error;
 use glam::DVec3;
 use subsurface::wgpu::{
-    BindGroup, BindingResource, CommandEncoder, Device, Sampler, TextureFormat, TextureView,
+    BindGroup, BindingResource, CommandEncoder, Device, Queue, Sampler, TextureFormat, TextureView,
 };
-use subsurface::{Atlas, Error, Profile};
+use subsurface::{Atlas, Profile};
 
 use super::atlas::{ATLAS, Gutter, uniform};
 use super::edge::{terms, vec3f};
@@ -124,7 +125,7 @@ fn sum_wgsl(weights: &[DVec3]) -> String {
 }
 
 impl AtlasMethod for TextureCascade {
-    fn prepare(&mut self, device: &Device, atlas: &Atlas) -> Result<(), Error> {
+    fn prepare(&mut self, device: &Device, _: &Queue, atlas: &Atlas) -> Result<(), Error> {
         let uniform = uniform(device, atlas)?;
         let size = size(atlas.irradiance);
         let label = "rivals texture_cascade";
@@ -180,9 +181,9 @@ impl AtlasMethod for TextureCascade {
         Ok(())
     }
 
-    fn render(&self, encoder: &mut CommandEncoder) {
+    fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
         let (Some([color, stretch, rows]), Some(prepared)) = (&self.scratch, &self.prepared) else {
-            return;
+            return Ok(());
         };
         self.pack.draw(encoder, &prepared.pack, &[color, stretch]);
         for (i, (u, v)) in self.blurs.iter().enumerate() {
@@ -190,7 +191,8 @@ impl AtlasMethod for TextureCascade {
             v.draw(encoder, &prepared.blurs[i].1, &[&self.blurred[i]]);
         }
         self.sum.draw(encoder, &prepared.sum, &[rows]);
-        self.gutter.render(encoder);
+        self.gutter.render(encoder, output);
+        Ok(())
     }
 
     fn scratch_bytes_per_texel(&self) -> f64 {

@@ -3,8 +3,8 @@
 use std::fmt;
 use std::time::Duration;
 
+use crate::Error;
 use glam::Vec3;
-use subsurface::Error;
 
 use crate::stability::lab::Lab;
 

@@ -1,9 +1,9 @@
 //! A synthetic frame on the device, as a host would hand it over.
 
-use glam::{DVec3, Mat3, Mat4};
+use glam::{DVec3, Mat4};
 use half::f16;
+use subsurface::Frame;
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Normals, Profile, ScreenFrame};
 
 use crate::renderer::Gpu;
 use crate::stability::lab::OUTPUT;
@@ -21,12 +21,11 @@ pub struct Texels {
 }
 
 /// The same, uploaded.
-pub struct Frame {
+pub struct HostFrame {
     irradiance: TextureView,
     depth: TextureView,
     profile_id: TextureView,
-    normal: Option<TextureView>,
-    output: TextureView,
+    pub output: TextureView,
     projection: Mat4,
 }
 
@@ -54,13 +53,12 @@ impl Texels {
         }
     }
 
-    pub fn upload(&self, gpu: &Gpu) -> Frame {
+    pub fn upload(&self, gpu: &Gpu) -> HostFrame {
         let size = self.size;
-        Frame {
+        HostFrame {
             irradiance: halves(gpu, "irradiance", size, &self.irradiance),
             depth: gpu.upload("depth", size, TextureFormat::R32Float, &self.depth),
             profile_id: gpu.upload("profile id", size, TextureFormat::R8Uint, &self.profile_id),
-            normal: None,
             output: gpu.target("scattered", size, OUTPUT),
             projection: self.projection,
         }
@@ -73,34 +71,13 @@ fn halves(gpu: &Gpu, label: &str, size: [u32; 2], texels: &[[f32; 4]]) -> Textur
     gpu.upload(label, size, TextureFormat::Rgba16Float, &bits)
 }
 
-impl Frame {
-    /// With the normals of what it shows.
-    pub fn with_normals(mut self, gpu: &Gpu, g: &GBuffer) -> Self {
-        let normals = g.hits.iter().map(|hit| {
-            let normal = hit.map_or(DVec3::ZERO, |h| h.normal);
-            normal.as_vec3().extend(0.0).to_array()
-        });
-        let normals: Vec<_> = normals.collect();
-        self.normal = Some(halves(gpu, "normal", g.view.size, &normals));
-        self
-    }
-
+impl HostFrame {
     /// In mm, of skin.
-    pub fn inputs(&self) -> ScreenFrame<'_> {
-        ScreenFrame {
-            irradiance: &self.irradiance,
-            depth: &self.depth,
-            profile_id: Some(&self.profile_id),
-            normal: self.normal.as_ref().map(|texture| Normals {
-                texture,
-                to_view: Mat3::IDENTITY,
-            }),
-            strength: None,
-            viewport: None,
-            output: &self.output,
-            projection: self.projection,
-            mm_per_unit: 1.0,
-            profiles: &[Profile::SKIN],
-        }
+    pub fn inputs(&self) -> Frame<'_> {
+        let projection = self.projection.to_cols_array_2d();
+        let mut frame = Frame::new(&self.irradiance, &self.depth, projection);
+        frame.profile_id = Some(&self.profile_id);
+        frame.mm_per_unit = 1.0;
+        frame
     }
 }

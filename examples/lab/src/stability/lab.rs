@@ -3,14 +3,12 @@
 use std::cell::RefCell;
 use std::sync::{Arc, Mutex};
 
+use crate::Error;
 use glam::Vec3;
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{
-    Atlas, DEFAULT_MAX_ERROR, Error, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace,
-    TextureSpace,
-};
+use subsurface::{Atlas, DEFAULT_MAX_ERROR, Frame, Plan, Profile, TextureSpace};
 
-use crate::method::{AtlasMethod, Planned, ScreenMethod};
+use crate::method::{self, AtlasMethod, Ours, ScreenMethod};
 use crate::renderer::Gpu;
 use crate::rivals;
 use crate::stability::case::METHODS;
@@ -70,12 +68,15 @@ impl Lab {
     ///
     /// # Errors
     /// A frame that a method refuses.
-    pub fn scatter(&self, frame: &ScreenFrame) -> Result<Vec<(&'static str, Vec<Vec3>)>, Error> {
+    pub fn scatter(
+        &self,
+        frame: &Frame,
+        output: &TextureView,
+    ) -> Result<Vec<(&'static str, Vec<Vec3>)>, Error> {
         let mut results = vec![("none", self.read(frame.irradiance))];
         for (name, method) in self.screen.borrow_mut().iter_mut() {
-            method.prepare(&self.gpu.device, frame)?;
-            self.gpu.run(|encoder| method.render(encoder));
-            results.push((*name, self.read(frame.output)));
+            method::scatter(&self.gpu, &mut **method, frame, output)?;
+            results.push((*name, self.read(output)));
         }
         Ok(results)
     }
@@ -84,12 +85,15 @@ impl Lab {
     ///
     /// # Errors
     /// An atlas that a method refuses.
-    pub fn scatter_atlas(&self, atlas: &Atlas) -> Result<Vec<(&'static str, Vec<Vec3>)>, Error> {
+    pub fn scatter_atlas(
+        &self,
+        atlas: &Atlas,
+        output: &TextureView,
+    ) -> Result<Vec<(&'static str, Vec<Vec3>)>, Error> {
         let mut results = Vec::new();
         for (name, method) in self.texture.borrow_mut().iter_mut() {
-            method.prepare(&self.gpu.device, atlas)?;
-            self.gpu.run(|encoder| method.render(encoder));
-            results.push((*name, self.read(atlas.output)));
+            method::scatter_atlas(&self.gpu, &mut **method, atlas, output)?;
+            results.push((*name, self.read(output)));
         }
         Ok(results)
     }
@@ -118,12 +122,9 @@ impl Lab {
 /// A device that a method refuses.
 pub fn screen_methods(gpu: &Gpu, profile: &Profile, plan: &Plan) -> Result<Vec<Screen>, Error> {
     let device = &gpu.device;
-    let exact = ScreenSpace::new(device, OUTPUT)?;
-    let planned = Planned {
-        effect: PlannedScreenSpace::new(device, OUTPUT)?,
-        queue: gpu.queue.clone(),
-        plan: plan.clone(),
-    };
+    let exact = Plan::exact(&[*profile])?;
+    let exact = Ours::new(device, OUTPUT, &exact)?;
+    let planned = Ours::new(device, OUTPUT, plan)?;
     let mut methods: Vec<Screen> = vec![
         ("screen_exact", Box::new(exact)),
         ("screen_planned", Box::new(planned)),
@@ -142,7 +143,7 @@ pub fn screen_methods(gpu: &Gpu, profile: &Profile, plan: &Plan) -> Result<Vec<S
 /// # Errors
 /// A device that a method refuses.
 pub fn texture_methods(gpu: &Gpu, profile: &Profile) -> Result<Vec<Texture>, Error> {
-    let ours = TextureSpace::new(&gpu.device, OUTPUT)?;
+    let ours = TextureSpace::new(&gpu.device, OUTPUT, &[*profile])?;
     let mut methods: Vec<Texture> = vec![("texture_separable", Box::new(ours))];
     for (name, setting, method) in rivals::atlas(&gpu.device, OUTPUT, profile) {
         if SETTINGS.contains(&(name, setting.as_str())) {

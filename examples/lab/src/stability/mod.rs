@@ -18,8 +18,8 @@ mod unwrapped;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use crate::Error;
 use indicatif::{ProgressBar, ProgressStyle};
-use subsurface::Error;
 
 use case::{Case, Judged};
 use lab::Lab;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use subsurface::Error;
+use crate::Error;
 
 const HELP: &str = "\
 Tries every method where methods fail, and writes what came out: failures.md, a table as SVG and PNG,

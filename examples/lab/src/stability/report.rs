@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use crate::Error;
 use image::codecs::jpeg::JpegEncoder;
-use subsurface::Error;
 
 use crate::output;
 use crate::stability::case::{Case, Group, INPUT, Judged, METHODS, Verdict, short};

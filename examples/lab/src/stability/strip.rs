@@ -1,8 +1,8 @@
 //! A picture of a case: the truth and every method side by side, and below each its error.
 
+use crate::Error;
 use glam::Vec3;
 use image::{Rgb, RgbImage, imageops};
-use subsurface::Error;
 
 use crate::stability::case::{Judged, Shown, short};
 use crate::svg::{Rasteriser, Svg, Type};

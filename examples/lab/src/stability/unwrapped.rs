@@ -1,9 +1,10 @@
 //! A synthetic surface in texture space: islands of an atlas, and the way from a pixel to its texel.
 
+use crate::Error;
 use glam::{DVec2, DVec3, UVec2, Vec3};
 use half::f16;
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Atlas, Error, Profile};
+use subsurface::{Atlas, Profile};
 
 use crate::renderer::Gpu;
 use crate::stability::lab::{Lab, OUTPUT};
@@ -83,7 +84,9 @@ impl Unwrapped {
         uvs: &[DVec2],
     ) -> Result<Vec<(&'static str, Vec<Vec3>)>, Error> {
         let uploaded = self.upload(&lab.gpu);
-        let results = lab.scatter_atlas(&uploaded.atlas())?.into_iter();
+        let results = lab
+            .scatter_atlas(&uploaded.atlas(), &uploaded.output)?
+            .into_iter();
         Ok(results
             .map(|(name, texels)| {
                 (
@@ -128,9 +131,7 @@ impl Uploaded {
         Atlas {
             irradiance: &self.irradiance,
             positions: &self.positions,
-            output: &self.output,
             mm_per_unit: 1.0,
-            profiles: &[Profile::SKIN],
         }
     }
 }

@@ -19,7 +19,10 @@ pub fn scattered_step(x_mm: f64, blur_mm2: f64, profile: &Profile) -> DVec3 {
     profile
         .gaussians()
         .iter()
-        .map(|g| g.weight.as_dvec3() * step(x_mm, f64::from(g.variance_mm2) + blur_mm2))
+        .map(|g| {
+            glam::DVec3::from(g.weight.map(f64::from))
+                * step(x_mm, f64::from(g.variance_mm2) + blur_mm2)
+        })
         .sum()
 }
 
@@ -28,7 +31,7 @@ pub fn passed_wave(rad_per_mm: f64, profile: &Profile) -> DVec3 {
     let passed = |v: f32| (-0.5 * f64::from(v) * rad_per_mm * rad_per_mm).exp();
     let gaussians = profile.gaussians().iter();
     gaussians
-        .map(|g| g.weight.as_dvec3() * passed(g.variance_mm2))
+        .map(|g| glam::DVec3::from(g.weight.map(f64::from)) * passed(g.variance_mm2))
         .sum()
 }
 
@@ -40,7 +43,7 @@ pub fn scattered_spot(r_mm: f64, spot_mm2: f64, profile: &Profile) -> DVec3 {
     };
     let gaussians = profile.gaussians().iter();
     gaussians
-        .map(|g| g.weight.as_dvec3() * spread(g.variance_mm2))
+        .map(|g| glam::DVec3::from(g.weight.map(f64::from)) * spread(g.variance_mm2))
         .sum()
 }
 
@@ -76,7 +79,7 @@ pub fn passed_harmonics(rho_mm: f64, degrees: usize, profile: &Profile) -> Vec<D
             if l > 0 {
                 factor *= ratios[l];
             }
-            *sum += g.weight.as_dvec3() * factor;
+            *sum += glam::DVec3::from(g.weight.map(f64::from)) * factor;
         }
     }
     passed
@@ -132,7 +135,7 @@ pub fn scattered_cosine_around(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -
         let mut factor = 1.0;
         for (n, sum) in scattered.iter_mut().enumerate() {
             factor *= ratios[n];
-            *sum += g.weight.as_dvec3() * factor * coefficient(n);
+            *sum += glam::DVec3::from(g.weight.map(f64::from)) * factor * coefficient(n);
         }
     }
     move |phi| {
@@ -148,7 +151,8 @@ pub fn through_slab(thickness_mm: f64, profile: &Profile) -> DVec3 {
     gaussians
         .map(|g| {
             let v = f64::from(g.variance_mm2);
-            g.weight.as_dvec3() * (-thickness_mm * thickness_mm / (2.0 * v)).exp()
+            glam::DVec3::from(g.weight.map(f64::from))
+                * (-thickness_mm * thickness_mm / (2.0 * v)).exp()
         })
         .sum()
 }

@@ -75,8 +75,8 @@ pub fn surface_integral<E>(
     };
     for g in profile.gaussians().iter().filter(|g| g.variance_mm2 == 0.0) {
         for (i, p) in asked.iter().enumerate() {
-            result.printed[i] += g.weight * p.irradiance;
-            result.normalised[i] += g.weight * p.irradiance;
+            result.printed[i] += Vec3::from(g.weight) * p.irradiance;
+            result.normalised[i] += Vec3::from(g.weight) * p.irradiance;
         }
     }
     let groups = by_spacing(profile, density);
@@ -102,7 +102,7 @@ pub fn surface_integral<E>(
             let mut sums = [Vec3::ZERO; 2];
             for g in gaussians {
                 let lit = lit.sum(p.point_mm, g.variance_mm2);
-                let mean = g.weight * (lit.light / lit.mass).as_vec3();
+                let mean = Vec3::from(g.weight) * (lit.light / lit.mass).as_vec3();
                 let mass = surface.sum(p.point_mm, g.variance_mm2).mass as f32;
                 sums[0] += mean * mass / (TAU * g.variance_mm2);
                 sums[1] += mean;

@@ -36,11 +36,11 @@ pub fn visible_integral(
             let pixel = &pixels[i];
             let scattered = profile.gaussians().iter().map(|g| {
                 if g.variance_mm2 == 0.0 {
-                    return g.weight * pixel.patch.irradiance;
+                    return Vec3::from(g.weight) * pixel.patch.irradiance;
                 }
                 let v = lattice_variance(g.variance_mm2.into(), pixel.facing_mm2.into());
                 let sum = cloud.sum(pixel.patch.point_mm, v as f32);
-                g.weight * (sum.light / sum.mass).as_vec3()
+                Vec3::from(g.weight) * (sum.light / sum.mass).as_vec3()
             });
             let sum = scattered.sum();
             progress(1.0 / asked.len() as f64);

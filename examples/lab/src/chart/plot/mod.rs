@@ -243,7 +243,7 @@ fn method_of(name: &str) -> (&str, &str) {
 /// Width of the red light's profile: the square root of its mean variance.
 fn red_sigma_mm() -> f64 {
     let gaussians = Profile::SKIN.gaussians().iter();
-    let variance: f32 = gaussians.map(|g| g.weight.x * g.variance_mm2).sum();
+    let variance: f32 = gaussians.map(|g| g.weight[0] * g.variance_mm2).sum();
     f64::from(variance).sqrt()
 }
 

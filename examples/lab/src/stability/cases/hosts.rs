@@ -2,8 +2,9 @@
 
 mod memory;
 
+use crate::Error;
 use glam::{DVec3, Vec3};
-use subsurface::{Error, Profile};
+use subsurface::Profile;
 
 use super::surface::{Methods, Surface, Uploaded, methods, ours};
 use super::{STEP, larger, worst};
@@ -174,12 +175,12 @@ fn interleaved() -> Case {
                 }
                 // Each now has the other's frame.
                 let [a, b] = &mut effects;
-                a.prepare(&gpu.device, &surfaces[1])?;
-                b.prepare(&gpu.device, &surfaces[0])?;
+                a.prepare(gpu, &surfaces[1])?;
+                b.prepare(gpu, &surfaces[0])?;
                 gpu.run(|encoder| {
-                    a.render(encoder);
-                    b.render(encoder);
-                });
+                    a.render(encoder, surfaces[1].output())?;
+                    b.render(encoder, surfaces[0].output())
+                })?;
                 for (surface, alone) in surfaces.iter().zip(&alone) {
                     figures.add(name, apart(&surface.read(gpu), alone));
                 }
@@ -215,8 +216,8 @@ fn lost() -> Case {
                 let mut encoder = gpu.device.create_command_encoder(&Default::default());
                 for (_, method) in &mut methods {
                     // An error is as good an answer as none.
-                    let _ = method.prepare(&gpu.device, &surface);
-                    method.render(&mut encoder);
+                    let _ = method.prepare(&gpu, &surface);
+                    let _ = method.render(&mut encoder, surface.output());
                 }
                 gpu.queue.submit([encoder.finish()]);
                 before

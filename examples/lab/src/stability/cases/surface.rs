@@ -1,18 +1,15 @@
 //! One surface for methods of both spaces: a frame, and an atlas whose texels are the pixels of that
 //! frame, so that all know the same.
 
-use std::slice;
-
+use crate::Error;
 use glam::{DVec3, Mat4, Vec3};
-use subsurface::wgpu::{CommandEncoder, Device, TextureFormat, TextureView};
-use subsurface::{
-    Atlas, Error, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace, TextureSpace,
-};
+use subsurface::wgpu::{CommandEncoder, TextureFormat, TextureView};
+use subsurface::{Atlas, Frame, Plan, Profile, TextureSpace};
 
 use super::Results;
-use crate::method::{AtlasMethod, Planned, ScreenMethod};
+use crate::method::{AtlasMethod, Ours, ScreenMethod};
 use crate::renderer::Gpu;
-use crate::stability::frame::{Frame, Texels};
+use crate::stability::frame::{HostFrame, Texels};
 use crate::stability::lab::{self, Lab, OUTPUT};
 use crate::synthetic::GBuffer;
 
@@ -28,9 +25,8 @@ pub struct Surface {
 
 /// The same on a device.
 pub struct Uploaded {
-    frame: Frame,
+    frame: HostFrame,
     positions: TextureView,
-    profile: Profile,
     mm_per_unit: f32,
 }
 
@@ -80,19 +76,20 @@ impl Surface {
         Uploaded {
             frame: texels.upload(gpu),
             positions: gpu.upload("positions", texels.size, full, &positions),
-            profile: self.profile,
             mm_per_unit: unit,
         }
     }
 }
 
 impl Uploaded {
-    pub fn frame(&self) -> ScreenFrame<'_> {
-        ScreenFrame {
-            mm_per_unit: self.mm_per_unit,
-            profiles: slice::from_ref(&self.profile),
-            ..self.frame.inputs()
-        }
+    pub fn frame(&self) -> Frame<'_> {
+        let mut frame = self.frame.inputs();
+        frame.mm_per_unit = self.mm_per_unit;
+        frame
+    }
+
+    pub fn output(&self) -> &TextureView {
+        &self.frame.output
     }
 
     pub fn atlas(&self) -> Atlas<'_> {
@@ -100,9 +97,7 @@ impl Uploaded {
         Atlas {
             irradiance: frame.irradiance,
             positions: &self.positions,
-            output: frame.output,
             mm_per_unit: frame.mm_per_unit,
-            profiles: slice::from_ref(&self.profile),
         }
     }
 
@@ -111,8 +106,8 @@ impl Uploaded {
     /// # Errors
     /// A surface that a method refuses.
     pub fn scatter(&self, lab: &Lab) -> Result<Results, Error> {
-        let mut results = lab.scatter(&self.frame())?;
-        results.extend(lab.scatter_atlas(&self.atlas())?);
+        let mut results = lab.scatter(&self.frame(), self.output())?;
+        results.extend(lab.scatter_atlas(&self.atlas(), self.output())?);
         Ok(results)
     }
 
@@ -121,14 +116,14 @@ impl Uploaded {
     /// # Errors
     /// A surface that it refuses.
     pub fn by(&self, gpu: &Gpu, method: &mut Method) -> Result<Vec<[f32; 4]>, Error> {
-        method.prepare(&gpu.device, self)?;
-        gpu.run(|encoder| method.render(encoder));
+        method.prepare(gpu, self)?;
+        gpu.run(|encoder| method.render(encoder, self.output()))?;
         Ok(self.read(gpu))
     }
 
     /// What was written last.
     pub fn read(&self, gpu: &Gpu) -> Vec<[f32; 4]> {
-        gpu.read(self.frame().output)
+        gpu.read(self.output())
     }
 }
 
@@ -141,17 +136,20 @@ pub enum Method {
 impl Method {
     /// # Errors
     /// A surface that it refuses.
-    pub fn prepare(&mut self, device: &Device, surface: &Uploaded) -> Result<(), Error> {
+    pub fn prepare(&mut self, gpu: &Gpu, surface: &Uploaded) -> Result<(), Error> {
+        let (device, queue) = (&gpu.device, &gpu.queue);
         match self {
-            Self::Screen(method) => method.prepare(device, &surface.frame()),
-            Self::Texture(method) => method.prepare(device, &surface.atlas()),
+            Self::Screen(method) => method.prepare(device, queue, &surface.frame()),
+            Self::Texture(method) => method.prepare(device, queue, &surface.atlas()),
         }
     }
 
-    pub fn render(&self, encoder: &mut CommandEncoder) {
+    /// # Errors
+    /// An output that it refuses.
+    pub fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
         match self {
-            Self::Screen(method) => method.render(encoder),
-            Self::Texture(method) => method.render(encoder),
+            Self::Screen(method) => method.render(encoder, output),
+            Self::Texture(method) => method.render(encoder, output),
         }
     }
 }
@@ -164,16 +162,13 @@ pub type Methods = Vec<(&'static str, Method)>;
 /// A device that one of them refuses.
 pub fn ours(gpu: &Gpu, plan: &Plan) -> Result<Methods, Error> {
     let device = &gpu.device;
-    let planned = Planned {
-        effect: PlannedScreenSpace::new(device, OUTPUT)?,
-        queue: gpu.queue.clone(),
-        plan: plan.clone(),
-    };
-    let exact = Box::new(ScreenSpace::new(device, OUTPUT)?);
-    let texture = Box::new(TextureSpace::new(device, OUTPUT)?);
+    let exact = Plan::exact(plan.profiles())?;
+    let exact = Box::new(Ours::new(device, OUTPUT, &exact)?);
+    let planned = Box::new(Ours::new(device, OUTPUT, plan)?);
+    let texture = Box::new(TextureSpace::new(device, OUTPUT, plan.profiles())?);
     Ok(vec![
         ("screen_exact", Method::Screen(exact)),
-        ("screen_planned", Method::Screen(Box::new(planned))),
+        ("screen_planned", Method::Screen(planned)),
         ("texture_separable", Method::Texture(texture)),
     ])
 }

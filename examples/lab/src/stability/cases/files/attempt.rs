@@ -4,7 +4,7 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-use subsurface::Error;
+use crate::Error;
 
 /// An input of less than a megabyte is read in a tenth of a second, on a busy machine in some.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -55,10 +55,11 @@ impl Attempt {
             Ok(Ok(Some(flaw))) => Some(format!("was taken, with {flaw}")),
             Ok(Ok(None)) => (self.wanted == Wanted::Refused).then(|| "was taken".into()),
             Ok(Err(e)) if self.wanted == Wanted::Taken => Some(format!("was refused: {e}")),
-            Ok(Err(Error { input, got, needs })) => [input, got, needs]
-                .iter()
-                .any(|part| part.trim().is_empty())
-                .then(|| "was refused without a reason".into()),
+            Ok(Err(e)) => {
+                let said = e.to_string();
+                let has_reason = said.contains(": got ") && said.contains(", needs ");
+                (!has_reason).then(|| format!("was refused without a reason: {said}"))
+            }
         };
         let taken = before.zip(memory()).and_then(|(before, after)| {
             let grew = after.peak > before.peak;

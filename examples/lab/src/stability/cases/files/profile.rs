@@ -8,7 +8,7 @@ use crate::model::flaw_of_profile;
 
 fn attempt(name: impl Into<String>, wanted: Wanted, text: String) -> Attempt {
     Attempt::new(name, wanted, move || {
-        Profile::from_json(&text).map(|profile| flaw_of_profile(&profile))
+        Ok(flaw_of_profile(&Profile::from_json(&text)?))
     })
 }
 
@@ -26,7 +26,7 @@ pub fn all() -> Vec<Attempt> {
     let skin: Vec<Value> = Profile::SKIN
         .gaussians()
         .iter()
-        .map(|g| json!({"variance_mm2": g.variance_mm2, "weight": g.weight.to_array()}))
+        .map(|g| json!({"variance_mm2": g.variance_mm2, "weight": g.weight}))
         .collect();
     let skin = of(&skin);
     let refused: Vec<(&str, String)> = vec![

@@ -36,11 +36,12 @@ pub fn case(quick: bool) -> Case {
                 let mut frame = 0;
                 let mut go_on = |frames: usize| {
                     for _ in 0..frames {
-                        method.prepare(&gpu.device, &surfaces[frame / 10 % 2])?;
-                        gpu.run(|encoder| method.render(encoder));
+                        let surface = &surfaces[frame / 10 % 2];
+                        method.prepare(gpu, surface)?;
+                        gpu.run(|encoder| method.render(encoder, surface.output()))?;
                         frame += 1;
                     }
-                    Ok(bytes(gpu))
+                    Ok::<_, crate::Error>(bytes(gpu))
                 };
                 let start = go_on(frames / 3)?;
                 let middle = go_on(frames / 2)?;

@@ -1,8 +1,8 @@
 //! Light: none, hardly any, the most that half floats hold, and what is no number.
 
+use crate::Error;
 use glam::{DVec2, DVec3, Vec3};
 use half::f16;
-use subsurface::Error;
 
 use super::EVEN;
 use crate::stability::case::{Case, Group, Known, Outcome};

@@ -199,9 +199,8 @@ fn large() -> Case {
             let mut figures = Vec::new();
             // One at a time, since the scratch textures of all of them are 5 GiB.
             for (name, mut method) in methods(&lab.gpu, &Profile::SKIN, &lab.plan)? {
-                method.prepare(&lab.gpu.device, &uploaded)?;
-                lab.gpu.run(|encoder| method.render(encoder));
-                let cut = lab.read(&cut(&lab.gpu, uploaded.frame().output, PART));
+                uploaded.by(&lab.gpu, &mut method)?;
+                let cut = lab.read(&cut(&lab.gpu, uploaded.output(), PART));
                 let own = small.iter().find(|(m, _)| *m == name);
                 let truth = own.map(|(_, r)| r.iter().map(|e| e.as_dvec3()).enumerate());
                 let truth = truth.into_iter().flatten();
@@ -234,7 +233,10 @@ fn too_large() -> Case {
             let limit = gpu.device.limits().max_texture_dimension_2d;
             let size = [limit + 1, 1];
             let refused = gpu.check_size(size).err();
-            let named = refused.is_some_and(|e| e.input == "size" && e.needs.contains(&limit.to_string()));
+            let named = refused.is_some_and(|e| {
+                let said = e.to_string();
+                said.starts_with("size: ") && said.contains(&limit.to_string())
+            });
             let good = Surface::of(&waves([64; 2]), DVec3::ZERO).upload(gpu);
             let mut figures = Vec::new();
             for (name, mut method) in methods(gpu, &Profile::SKIN, &lab.plan)? {
@@ -242,8 +244,8 @@ fn too_large() -> Case {
                 let scope = gpu.device.push_error_scope(ErrorFilter::Validation);
                 let bad = Surface::of(&waves(size), DVec3::ZERO).upload(gpu);
                 // Whether it refuses them or not, as long as it goes on.
-                if method.prepare(&gpu.device, &bad).is_ok() {
-                    gpu.run(|encoder| method.render(encoder));
+                if method.prepare(gpu, &bad).is_ok() {
+                    let _ = gpu.run(|encoder| method.render(encoder, bad.output()));
                 }
                 let told = pollster::block_on(scope.pop()).is_some();
                 let after = good.by(gpu, &mut method)?;

@@ -57,7 +57,7 @@ fn width(name: &str, sigma_mm: f32, side: u32) -> Case {
         run: Box::new(move |lab| {
             let profile = Profile::new(&[Gaussian {
                 variance_mm2: sigma_mm * sigma_mm,
-                weight: Vec3::ONE,
+                weight: [1.0; 3],
             }])?;
             let plan = Plan::new(&[profile], DEFAULT_MAX_ERROR)?;
             let g = edge(side);

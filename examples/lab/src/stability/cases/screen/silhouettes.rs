@@ -23,17 +23,13 @@ pub fn cases(quick: bool) -> Vec<Case> {
         // Of the background nothing is shown.
         [black, unpictured(bright)]
     };
-    let mut cases: Vec<Case> = [part(finger), part(rim)].into_iter().flatten().collect();
-    cases.push(case(rim, Before::BlackWithNormals, quick));
-    cases
+    [part(finger), part(rim)].into_iter().flatten().collect()
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Before {
     Black,
     Bright,
-    /// Handed over by the host.
-    BlackWithNormals,
 }
 
 /// A cylinder's name, radius, half the side of the crop and texels.
@@ -42,27 +38,23 @@ fn case(
     before: Before,
     quick: bool,
 ) -> Case {
-    let has_normals = before == Before::BlackWithNormals;
     let background = if before == Before::Bright { 4.0 } else { 0.0 };
     Case {
         group: Group::Screen,
         name: match before {
             Before::Black => format!("{part} before black"),
             Before::Bright => format!("{part} before bright"),
-            Before::BlackWithNormals => format!("{part}, normals handed in"),
         },
         what: format!(
             "A cylinder of {rho_mm} mm radius at 27 degrees in the picture, lit from {LIGHT_DEGREES} degrees to the side, \
-             before a background of light {}, 4 px/mm{}: the largest difference to the visible integral, without a \
+             before a background of light 0 or 4, 4 px/mm: the largest difference to the visible integral, without a \
              rim of one pixel; in texture space to the closed form of all of it.",
-            if has_normals { "0" } else { "0 or 4" },
-            if has_normals { ", with a texture of normals, which ours look at" } else { "" },
         ),
         passes: FOUND,
         degrades: SEEN,
         why: "a halo or a dark line of .01 is what an eye may find; the slopes of the rim's own pixels are a guess, so \
               that they do not count.".into(),
-        known: if rho_mm < 1.0 { thin(has_normals) } else { vec![] },
+        known: if rho_mm < 1.0 { thin() } else { vec![] },
         run: Box::new(move |lab| {
             let view = View::orthographic([128; 2], 4.0);
             let across = DVec2::from_angle(27f64.to_radians()).extend(0.0);
@@ -87,31 +79,17 @@ fn case(
                 screen: Truth::Visible,
                 texture: Some((texels, Truth::Paper(&paper))),
             };
-            if has_normals {
-                trial.run_with_normals(lab)
-            } else {
-                trial.run(lab)
-            }
+            trial.run(lab)
         }),
     }
 }
 
 /// Where a part is six pixels wide.
-fn thin(has_normals: bool) -> Vec<Known> {
-    let exact = known(
-        "screen_exact",
-        0.033,
-        "Most of its area lies in the outer pixels, and a pixel's area follows from its slope, which is a guess where it \
-         comes from the depth of neighbours. Hand normals over, or take `TextureSpace`.",
-    );
-    let planned = known(
-        "screen_planned",
-        if has_normals { 0.034 } else { 0.043 },
-        "A coarse pixel is wider than the part. Take `ScreenSpace` with normals, or `TextureSpace`.",
-    );
-    if has_normals {
-        vec![planned]
-    } else {
-        vec![exact, planned]
-    }
+fn thin() -> Vec<Known> {
+    let why = "Most of its area lies in the outer pixels, and a pixel's area follows from its slope, which is a guess at a \
+               rim. Take `TextureSpace`.";
+    vec![
+        known("screen_exact", 0.033, why),
+        known("screen_planned", 0.043, why),
+    ]
 }

@@ -1,7 +1,8 @@
 //! Skin that the camera sees at a slant.
 
+use crate::Error;
 use glam::{DVec2, DVec3};
-use subsurface::{Error, Profile};
+use subsurface::Profile;
 
 use super::scene::{Form, Scene, Surface};
 use super::trial::{Trial, Truth, middle, worst_of};

@@ -1,12 +1,13 @@
 //! One frame by every method, each held to what it can know.
 
+use crate::Error;
 use glam::{DVec2, DVec3};
-use subsurface::{Error, Profile};
+use subsurface::Profile;
 
 use super::scene::Scene;
 use crate::stability::case::Outcome;
 use crate::stability::cases::{Crop, larger, worst};
-use crate::stability::frame::{Frame, Texels};
+use crate::stability::frame::Texels;
 use crate::stability::lab::Lab;
 use crate::synthetic::{GBuffer, Hit, View};
 
@@ -41,23 +42,10 @@ impl Trial<'_> {
     /// # Errors
     /// A frame that a method refuses.
     pub fn run(&self, lab: &Lab) -> Result<Outcome, Error> {
-        self.over(lab, |frame, _| frame)
-    }
-
-    /// The same, of a host that hands normals over.
-    ///
-    /// # Errors
-    /// A frame that a method refuses.
-    pub fn run_with_normals(&self, lab: &Lab) -> Result<Outcome, Error> {
-        self.over(lab, |frame, g| frame.with_normals(&lab.gpu, g))
-    }
-
-    fn over(&self, lab: &Lab, more: impl Fn(Frame, &GBuffer) -> Frame) -> Result<Outcome, Error> {
         let width = self.view.size[0];
         let g = self.scene.shoot(&self.view);
         let frame = Texels::of(&g, DVec3::splat(self.background)).upload(&lab.gpu);
-        let frame = more(frame, &g);
-        let mut results = lab.scatter(&frame.inputs())?;
+        let mut results = lab.scatter(&frame.inputs(), &frame.output)?;
         let asked: Vec<(usize, usize, Hit)> = self
             .crop
             .pixels(width)

@@ -56,7 +56,7 @@ pub fn run(seam_degrees: f64, quick: bool) -> Run {
             .map(|(_, h)| h.normal.x.atan2(h.normal.z))
             .collect();
         let frame = Texels::of(&g, DVec3::ZERO).upload(&lab.gpu);
-        let mut results = lab.scatter(&frame.inputs())?;
+        let mut results = lab.scatter(&frame.inputs(), &frame.output)?;
         let visible = g.visible_integral(&places, &Profile::SKIN);
         let visible: Vec<_> = places.iter().copied().zip(visible).collect();
 

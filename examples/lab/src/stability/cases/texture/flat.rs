@@ -3,8 +3,9 @@
 use std::cell::OnceCell;
 use std::rc::Rc;
 
+use crate::Error;
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2, Vec3};
-use subsurface::{Error, Profile};
+use subsurface::Profile;
 
 use super::super::{Crop, Results};
 use crate::stability::case::{Outcome, Run, Shown};
@@ -93,7 +94,7 @@ impl Square {
         };
         let asked = crop.pixels(self.size[0]);
         let frame = Texels::of(&g, DVec3::ZERO).upload(&lab.gpu);
-        let screen = lab.scatter(&frame.inputs())?.into_iter();
+        let screen = lab.scatter(&frame.inputs(), &frame.output)?.into_iter();
         let cut = |pixels: Vec<Vec3>| asked.iter().map(|i| pixels[*i]).collect();
         let on_square: Vec<DVec2> = asked
             .iter()

@@ -1,7 +1,8 @@
 //! Many heads: balls of skin, each with an atlas of its own.
 
+use crate::Error;
+use crate::method;
 use glam::{DVec2, DVec3, Vec3};
-use subsurface::Error;
 
 use super::super::{larger, largest};
 use crate::stability::case::{Outcome, Run};
@@ -62,7 +63,7 @@ fn look(heads: &[u32]) -> GBuffer {
 fn screen(lab: &Lab) -> Result<Vec<(&'static str, f64)>, Error> {
     let scatter = |g: &GBuffer| {
         let frame = Texels::of(g, DVec3::ZERO).upload(&lab.gpu);
-        lab.scatter(&frame.inputs())
+        lab.scatter(&frame.inputs(), &frame.output)
     };
     let heads: Vec<u32> = (0..SIDE * SIDE).collect();
     let together = scatter(&look(&heads))?;
@@ -86,19 +87,15 @@ fn texture(lab: &Lab) -> Result<Vec<(&'static str, f64)>, Error> {
         let upload = || heads.iter().map(|h| h.upload(&lab.gpu)).collect::<Vec<_>>();
         let (alone, together) = (upload(), upload());
         for head in &alone {
-            method.prepare(&lab.gpu.device, &head.atlas())?;
-            lab.gpu.run(|encoder| method.render(encoder));
+            method::scatter_atlas(&lab.gpu, &mut **method, &head.atlas(), &head.output)?;
         }
         // All in one submission, as a host would.
-        let mut recorded = Ok(());
         lab.gpu.run(|encoder| {
-            recorded = together.iter().try_for_each(|head| {
-                method.prepare(&lab.gpu.device, &head.atlas())?;
-                method.render(encoder);
-                Ok(())
-            });
-        });
-        recorded?;
+            together.iter().try_for_each(|head| {
+                method.prepare(&lab.gpu.device, &lab.gpu.queue, &head.atlas())?;
+                method.render(encoder, &head.output)
+            })
+        })?;
         let pairs = alone.iter().zip(&together).flat_map(|(a, b)| {
             let [a, b] = [a, b].map(|head| lab.read(&head.output));
             a.into_iter().zip(b)

@@ -3,8 +3,9 @@
 
 use std::f32::consts::TAU;
 
+use crate::Error;
+use crate::method;
 use glam::{Vec2, Vec3};
-use subsurface::{Error, Profile, ScreenFrame};
 
 use super::super::{Crop, Results, larger, largest};
 use crate::model::glb;
@@ -91,25 +92,12 @@ fn scatter(lab: &Lab, uv: Uvs) -> Result<(Results, Vec<bool>), Error> {
     renderer.render(gpu, &camera, &lighting, MM_PER_UNIT)?;
     let buffers = &renderer.gbuffer;
     let output = renderer.scattered_target(gpu);
-    let mut results = lab.scatter(&ScreenFrame {
-        irradiance: &buffers.irradiance,
-        depth: &buffers.depth,
-        profile_id: Some(&buffers.profile_id),
-        normal: None,
-        strength: None,
-        viewport: None,
-        output: &output,
-        projection: camera.projection(PIXELS),
-        mm_per_unit: MM_PER_UNIT,
-        profiles: &[Profile::SKIN],
-    })?;
+    let frame = buffers.frame(camera.projection(PIXELS), MM_PER_UNIT);
+    let mut results = lab.scatter(&frame, &output)?;
     let atlas = AtlasRenderer::new(gpu, &renderer, TEXELS)?;
     for (name, method) in lab.texture.borrow_mut().iter_mut() {
-        let profiles = [Profile::SKIN];
-        atlas.render(gpu, &renderer, &profiles, MM_PER_UNIT, &output, |atlas| {
-            method.prepare(&gpu.device, atlas)?;
-            gpu.run(|encoder| method.render(encoder));
-            Ok(())
+        atlas.render(gpu, &renderer, 1, MM_PER_UNIT, &output, |atlas, output| {
+            method::scatter_atlas(gpu, &mut **method, atlas, output)
         })?;
         results.push((*name, lab.read(&output)));
     }

@@ -1,7 +1,7 @@
 //! Points of a surface that are followed through the picture while the camera moves.
 
+use crate::Error;
 use glam::{DAffine3, DVec2, DVec3};
-use subsurface::Error;
 
 use super::track::{TAPS, Track, errors, taps};
 use crate::stability::case::Outcome;
@@ -48,7 +48,7 @@ impl Scene<'_> {
                 })
             });
             let frame = Texels::of(&g, DVec3::ZERO).upload(&lab.gpu);
-            let results = lab.scatter(&frame.inputs())?;
+            let results = lab.scatter(&frame.inputs(), &frame.output)?;
             let taps = taps(&g, self.points.iter().map(|p| to_view.transform_point3(*p)));
             let places = taps.iter().map(|t| from_view.transform_point3(t.point));
             let places: Vec<DVec3> = places.collect();

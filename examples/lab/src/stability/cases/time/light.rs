@@ -3,8 +3,9 @@
 use std::cell::OnceCell;
 use std::rc::Rc;
 
+use crate::Error;
 use glam::{DVec2, DVec3, Vec3};
-use subsurface::{Error, Profile};
+use subsurface::Profile;
 
 use super::super::{Crop, Results, largest, unpictured};
 use super::atlas::{Sheet, sphere_uv, unwrapped_sphere};
@@ -54,7 +55,7 @@ fn at_pixels(
     uv: impl Fn(&Hit) -> DVec2,
 ) -> Result<Results, Error> {
     let frame = Texels::of(g, DVec3::ZERO).upload(&lab.gpu);
-    let results = lab.scatter(&frame.inputs())?.into_iter();
+    let results = lab.scatter(&frame.inputs(), &frame.output)?.into_iter();
     let mut results: Results = results
         .map(|(m, r)| (m, pixels.iter().map(|(i, _)| r[*i]).collect()))
         .collect();

@@ -203,7 +203,7 @@ fn past_a_layer(quick: bool) -> Case {
                     })
                 });
                 let frame = Texels::of(&g, DVec3::ZERO).upload(&lab.gpu);
-                let results = lab.scatter(&frame.inputs())?;
+                let results = lab.scatter(&frame.inputs(), &frame.output)?;
                 let taps = taps(&g, points.iter().map(|p| *p + moved));
                 let asked: Vec<usize> = taps.iter().map(|t| t.pixel).collect();
                 let truths = g.visible_integral(&asked, &Profile::SKIN);
@@ -248,7 +248,7 @@ fn by_whole_pixels() -> Case {
                 across: DVec3::Y,
                 side_mm: 28.0,
             };
-            let mut results = lab.scatter(&frame.inputs())?;
+            let mut results = lab.scatter(&frame.inputs(), &frame.output)?;
             let everywhere = g.pixels(|_| true);
             let uvs: Vec<DVec2> = everywhere.iter().map(|(_, h)| sheet.uv(h.point)).collect();
             let atlas = sheet.unwrap(120, |place| light(place.x));

@@ -72,7 +72,7 @@ pub fn case(quick: bool) -> Case {
                 let truths: Vec<DVec3> = taps.iter().map(|t| truth(t.point.x)).collect();
                 let uploaded = Texels::of(&g, DVec3::ZERO).upload(&lab.gpu);
                 let mut of_methods = Vec::new();
-                for (method, r) in lab.scatter(&uploaded.inputs())? {
+                for (method, r) in lab.scatter(&uploaded.inputs(), &uploaded.output)? {
                     if method != "burley_disk" {
                         let read = taps.iter().map(|t| r[t.pixel]);
                         of_methods.push((method, errors(&taps, &truths, read)));

@@ -1,7 +1,7 @@
 //! Buffers.
 
+use crate::Error;
 use serde_json::{Value, json};
-use subsurface::Error;
 
 use super::super::attempt::{Attempt, Wanted};
 use super::{attempt, changed};
