@@ -1,9 +1,10 @@
 //! Plans beside the exact effect on a head, over sizes of the frame, views, profiles and errors: what one
 //! size hides, another shows.
 
-use subsurface::{Gaussian, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace};
+use subsurface::{Gaussian, Plan, Profile};
+use subsurface_lab::method;
 use subsurface_lab::renderer::{Camera, Lighting, Renderer, Scene, View};
-use subsurface_lab::synthetic::gpu;
+use subsurface_lab::synthetic::{gpu, ours};
 
 const HEAD: &[u8] = subsurface_lab::HEAD;
 
@@ -47,34 +48,20 @@ fn sweep(
         .unwrap();
     let output = renderer.scattered_target(gpu());
     let format = output.texture().format();
-    let frame = ScreenFrame {
-        irradiance: &renderer.gbuffer.irradiance,
-        depth: &renderer.gbuffer.depth,
-        profile_id: Some(&renderer.gbuffer.profile_id),
-        normal: None,
-        strength: None,
-        viewport: None,
-        output: &output,
-        projection: camera.projection(size),
-        mm_per_unit: 1000.0,
-        profiles: &[profile],
+    let frame = renderer.gbuffer.frame(camera.projection(size), 1000.0);
+    let scatter = |plan: &Plan| {
+        method::scatter(gpu(), &mut ours(plan, format), &frame, &output).unwrap();
+        gpu().read(&output)
     };
-    let mut exact = ScreenSpace::new(&gpu().device, format).unwrap();
-    exact.prepare(&gpu().device, &frame).unwrap();
-    gpu().run(|encoder| exact.render(encoder));
-    let truth = gpu().read(&output);
-    let mut planned = PlannedScreenSpace::new(&gpu().device, format).unwrap();
-    let mut worst_of = |plan: &Plan| {
-        let (device, queue) = (&gpu().device, &gpu().queue);
-        planned.prepare(device, queue, &frame, plan).unwrap();
-        gpu().run(|encoder| planned.render(encoder));
+    let truth = scatter(&Plan::exact(&[profile]).unwrap());
+    let worst_of = |plan: &Plan| {
         let mut worst = Worst {
             difference: 0.0,
             pixel: [0; 2],
             not_finite: 0,
             beyond: 0,
         };
-        for (i, (found, wanted)) in (0..).zip(gpu().read(&output).iter().zip(&truth)) {
+        for (i, (found, wanted)) in (0..).zip(scatter(plan).iter().zip(&truth)) {
             if found.iter().any(|c| !c.is_finite()) {
                 worst.not_finite += 1;
                 continue;
@@ -89,7 +76,7 @@ fn sweep(
         }
         worst
     };
-    plans.iter().map(&mut worst_of).collect()
+    plans.iter().map(worst_of).collect()
 }
 
 #[test]

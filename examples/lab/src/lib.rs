@@ -6,7 +6,7 @@ pub mod compare;
 pub mod damage;
 mod error;
 pub mod filter;
-mod method;
+pub mod method;
 pub mod metrics;
 pub mod model;
 pub mod output;

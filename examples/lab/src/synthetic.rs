@@ -18,6 +18,11 @@ pub fn gpu() -> &'static Gpu {
     GPU.get_or_init(|| Gpu::headless().unwrap_or_else(|error| panic!("{error}")))
 }
 
+/// The effect by a plan, on that device.
+pub fn ours(plan: &Plan, format: TextureFormat) -> Ours {
+    Ours::new(&gpu().device, format, plan).expect("a device for the effect")
+}
+
 pub fn single_gaussian(variance_mm2: f32) -> Profile {
     Profile::new(&[subsurface::Gaussian {
         variance_mm2,
@@ -150,21 +155,16 @@ impl GBuffer {
 
     pub fn scatter_all(&self, profiles: &[Profile], format: TextureFormat) -> Vec<[f32; 4]> {
         let plan = Plan::exact(profiles).expect("a plan of these profiles");
-        self.scatter_by(&plan, format, |_| ())
+        self.scatter_by(&mut ours(&plan, format), |_| ())
     }
 
     /// The effect by a plan, with full floats in and out.
     pub fn scatter_planned(&self, plan: &Plan) -> Vec<[f32; 4]> {
-        self.scatter_by(plan, TextureFormat::Rgba32Float, |_| ())
+        self.scatter_by(&mut ours(plan, TextureFormat::Rgba32Float), |_| ())
     }
 
-    /// What the effect makes of the frame by a plan, after `change`.
-    pub fn scatter_by(
-        &self,
-        plan: &Plan,
-        format: TextureFormat,
-        change: impl FnOnce(&mut Frame),
-    ) -> Vec<[f32; 4]> {
+    /// What an effect makes of the frame, after `change`.
+    pub fn scatter_by(&self, ours: &mut Ours, change: impl FnOnce(&mut Frame)) -> Vec<[f32; 4]> {
         let gpu = gpu();
         let size = self.view.size;
         let mut irradiance = Vec::new();
@@ -188,9 +188,8 @@ impl GBuffer {
         frame.profile_id = Some(&id);
         frame.mm_per_unit = 1.0;
         change(&mut frame);
-        let output = gpu.target("output", size, format);
-        let mut ours = Ours::new(&gpu.device, format, plan).expect("a device for the effect");
-        method::scatter(gpu, &mut ours, &frame, &output).expect("a frame that fits");
+        let output = gpu.target("output", size, ours.effect.output().format());
+        method::scatter(gpu, ours, &frame, &output).expect("a frame that fits");
         gpu.read(&output)
     }
 
