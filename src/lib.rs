@@ -1,11 +1,31 @@
 //! Subsurface scattering of skin as a post-process for wgpu renderers, after Li & Shao 2015.
 //!
-//! A deferred renderer hands its lit diffuse irradiance and its depth to [`ScreenSpace`] and gets
-//! the scattered irradiance back, to be multiplied by albedo. [`TextureSpace`] does the same over
-//! an atlas of a mesh, the way of the paper; it is the reference that the screen is compared with.
-//! Both blur by a [`Profile`], a sum of Gaussians with variances in mm².
+//! A deferred renderer hands over the diffuse light on its surfaces and their depth, and gets that light
+//! back as skin spreads it:
 //!
-//! Feature `json`: profiles and plans as JSON, and serde's traits for them.
+//! ```text
+//! G-buffer → diffuse light E → [ subsurface ] → × albedo → + specular → transparency → TAA → tone mapping
+//! ```
+//!
+//! # One frame
+//! 1. A [`Plan`] says what is done: which blurs keep a stated error for a set of [`Profile`]s, sums of
+//!    Gaussians with variances in mm². [`Plan::skin`] is there at once; [`Plan::exact`] is the sum itself.
+//! 2. A [`ScreenSpace`] is that plan on a device: pipelines, made once and shared by all cameras.
+//! 3. A [`View`] is what one camera needs: scratch textures. Each frame [`View::prepare`] checks a [`Frame`]
+//!    and uploads a few hundred bytes; [`View::render`] records the passes. Nothing is submitted, and no
+//!    pipeline is made.
+//!
+//! [`TextureSpace`] scatters over an atlas of a mesh, the way of the paper: the reference that the screen
+//! is compared with.
+//!
+//! # Conventions
+//! Light is linear. Lengths are millimetres; [`Frame::mm_per_unit`] says how many a scene unit has. Matrices
+//! are column by column, view space is right-handed, depth runs from 0 to 1 in any direction. Errors are in
+//! units of white: of the radiance that the host shows as 1. Every input is checked before the device sees
+//! it, and what does not fit is an [`Error`] that names it.
+//!
+//! Features of the device: none, and no more than WebGPU's default limits. Feature `json` of the crate:
+//! profiles and plans as JSON, and serde's traits for them.
 
 mod error;
 mod exact;
@@ -31,3 +51,8 @@ pub use wgpu;
 
 /// The most profiles that a frame can mix.
 pub const MAX_PROFILES: usize = 16;
+
+/// The code of the README compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -188,8 +188,9 @@ mod tests {
     #[test]
     fn skin_reaches_as_far_as_its_taps() {
         assert!((Profile::SKIN.reach_mm() - 9.53).abs() < 0.01);
-        let taps = format!("const REACH_SIGMAS = {REACH_SIGMAS:?};");
-        assert!(include_str!("../shaders/exact/gaussian_sum.wgsl").contains(&taps));
+        let shader = crate::exact::gaussian_sum::SHADER;
+        let sigmas = crate::wgsl::constant(shader, "REACH_SIGMAS");
+        assert_eq!(sigmas, f64::from(REACH_SIGMAS));
     }
 
     #[test]

@@ -107,7 +107,8 @@ fn screen(change: impl FnOnce(&mut Inputs)) -> Result<(), Error> {
     let error = pollster(scope.pop());
     assert!(error.is_none(), "{error:?}");
     let [exact, planned] = results;
-    assert_eq!(exact, planned);
+    // As text, since a matrix may hold NaN, which equals nothing.
+    assert_eq!(format!("{exact:?}"), format!("{planned:?}"));
     exact
 }
 

@@ -1,18 +1,22 @@
-// The sum of Gaussians over a surface that is given by a position per pixel: the pixels of a frame
+// The exact sum of Gaussians over a surface that is given by a position per pixel: the pixels of a frame
 // (screen space) or the texels of an atlas (texture space).
 //
 //   L(p) = Σᵢ wᵢ · Σ_q E(q) A(q) exp(−|q−p|²/2vᵢ) / Σ_q A(q) exp(−|q−p|²/2vᵢ)
 //
-// [LS15] Li & Shao 2015, "GPU-based face rendering via the physical model of light interaction
-//        with human skin", Eq. 7–12. Their Eq. 10 lacks 1/v; the division above makes up for it.
-// [EL07] d'Eon & Luebke 2007, "Advanced techniques for realistic real-time skin rendering".
-// [S1874] E. Selling, "Ueber die binaeren und ternaeren quadratischen Formen", Crelle 77, 1874: reduced forms as
-//        sums of squares along steps of a lattice.
-// docs/method.md tells where this departs from both, and why.
+// Passes: fs_source, then for each Gaussian fs_rows and fs_sum, then one of fs_resolve, fs_add and
+// fs_difference.
+//
+// [LS15]  Li & Shao 2015, "GPU-based face rendering via the physical model of light interaction with
+//         human skin", Eq. 7–12. Their Eq. 10 lacks 1/v; the division above makes up for it.
+// [EL07]  d'Eon & Luebke 2007, "Advanced techniques for realistic real-time skin rendering".
+// [M10]   Mikkelsen 2010, "Skin rendering by pseudo-separable cross bilateral filtering".
+// [S1874] Selling 1874, "Ueber die binaeren und ternaeren quadratischen Formen": reduced forms as sums
+//         of squares along steps of a lattice.
+// docs/method.md tells where this departs from them, and why.
 
 struct Settings {
     // Weights of red, green and blue, and the variance in mm²: Gaussian i of profile id is at
-    // 8·(id − 1) + i.
+    // MAX_GAUSSIANS·(id − 1) + i.
     gaussians: array<vec4f, 128>,
     // The mm between neighbouring pixels of a surface that faces the camera, at view depth z:
     // |x + y·z| along a row, |z + w·z| along a column. Zero: as far as the surface itself says.
@@ -43,19 +47,25 @@ struct Settings {
 // What multiplies the light that is added to a target.
 @group(0) @binding(7) var albedo: texture_2d<f32>;
 
+// Of a profile.
+const MAX_GAUSSIANS = 8u;
 // Beyond 3.5 σ a Gaussian on a plane holds e^(−3.5²/2) = .2 % of its mass.
 const REACH_SIGMAS = 3.5;
-// Up to this variance along each of three steps of the lattice, in steps², a kernel is summed over their neighbours:
-// there a row of taps is too coarse to be sheared.
+// Up to this variance along each of three steps of the lattice, in steps², a kernel is summed over their
+// neighbours: there a row of taps is too coarse to be sheared.
 const SMALL = 0.4;
 // Variance along a row, in px², from which the nearest pixel stands for a sheared tap.
 const WIDE_PX2 = 9.0;
 // How far off a pixel a tap may lie to be that pixel.
 const NEGLIGIBLE_PX = 1.0 / 512.0;
-// How far a row may stray from the tangent plane before it is weighed anew: in squared mm as a
-// share of the squared distance, and of the variance; by a Gaussian of full weight.
-const BEND = 0.03;
-const STRAY = 0.018;
+// How far a row may lie off the tangent plane before it is weighed anew by a Gaussian of full weight: in
+// squared mm, as a share of the squared distance, and of the variance.
+const OFF_PLANE_OF_DISTANCE2 = 0.03;
+const OFF_PLANE_OF_VARIANCE = 0.018;
+// The wave, in rad a pixel, that narrow kernels are made to pass as their Gaussian does.
+const WAVE = 1.1;
+const COS_WAVE = cos(1.1);
+const COS_2WAVE = cos(2.2);
 
 // Whether light is a number. By its bits, since compilers may take for granted that it is.
 fn is_finite(light: vec3f) -> bool {
@@ -150,8 +160,8 @@ fn one_sided(a: vec3f, beyond: Point, next: Point) -> vec3f {
     let a2 = dot(a, a);
     let b2 = dot(a + c, a + c);
     let turn = dot(a, c) * inverseSqrt(max(a2 * dot(c, c), 1e-30));
-    // A turn by 45 degrees is a ridge; and no more than the last turn once again, since where exactly a rim ends is
-    // not known.
+    // A turn by 45 degrees is a ridge; and no more than the last turn once again, since where exactly a rim
+    // ends is not known.
     let on = saturate(5.0 * (turn - 0.7)) * clamp(a2 / max(b2 - 2.0 * a2, 1e-20), 0.0, 1.0);
     return a + on * (a - c);
 }
@@ -163,11 +173,11 @@ struct Metric {
     // κ = M₀₁/M₀₀.
     shear: f32,
     m00: f32,
-    // The mm between pixels along a row and between sheared rows; on the screen those of a surface that faces
-    // the camera, which are the shortest.
+    // The mm between pixels along a row and between sheared rows; on the screen those of a surface that
+    // faces the camera, which are the shortest.
     spacing: vec2f,
-    // M₀₀, M₀₁ and M₁₁ of the points, as the weights of narrow Gaussians need them: the surface's own; on the
-    // screen, the more it bends within a pixel, those of one that faces the camera.
+    // M₀₀, M₀₁ and M₁₁ of the points, as the weights of narrow Gaussians need them: the surface's own; on
+    // the screen, the more it bends within a pixel, those of one that faces the camera.
     lattice: vec3f,
 }
 
@@ -204,26 +214,25 @@ fn rows_of(lattice: vec3f) -> vec2f {
 }
 
 fn gaussian(here: Point, i: u32) -> vec4f {
-    return settings.gaussians[8u * (here.profile - 1u) + i];
+    return settings.gaussians[MAX_GAUSSIANS * (here.profile - 1u) + i];
 }
 
-// The variance whose point weights, on a lattice of this spacing, pass a wave of 1.1 rad/px as the
-// Gaussian does: light that is soft by a pixel comes out right.
+// The variance whose point weights, on a lattice of this spacing, pass a wave of ω = WAVE as the Gaussian
+// does: light that is soft by a pixel comes out right. `lattice_variance` in src/plan/edge_response.rs.
 //
-// Point weights of a Gaussian under ~ .6 px spread less than it does: with w = e^(−1/2s) at the next
-// pixel they pass (1 + 2w cos 1.1 + 2w⁴ cos 2.2)/(1 + 2w + 2w⁴) of the wave instead of e^(−1.1² s/2).
-// Solved for w.
+// Point weights of a Gaussian under 0.6 px spread less than it does: with w = e^(−1/2s) at the next pixel
+// they pass (1 + 2w cos ω + 2w⁴ cos 2ω)/(1 + 2w + 2w⁴) of the wave instead of e^(−ω²s/2). Solved for w.
 fn lattice_variance(variance_mm2: f32, spacing: f32) -> f32 {
     let px2 = max(spacing * spacing, 1e-20);
     let s = variance_mm2 / px2;
     if s > 0.4 || s < 1e-6 {
         return variance_mm2;
     }
-    let passed = exp(-0.605 * s);
-    var w = 0.5 * (1.0 - passed) / (passed - 0.45360);
+    let passed = exp(-0.5 * WAVE * WAVE * s);
+    var w = 0.5 * (1.0 - passed) / (passed - COS_WAVE);
     for (var step = 0; step < 6; step++) {
         let w4 = w * w * w * w;
-        w = 0.5 * (1.0 - passed - 2.0 * (passed + 0.58850) * w4) / (passed - 0.45360);
+        w = 0.5 * (1.0 - passed - 2.0 * (passed - COS_2WAVE) * w4) / (passed - COS_WAVE);
     }
     return -0.5 * px2 / log(w);
 }
@@ -234,7 +243,7 @@ fn reach(spacing: vec2f, variance_mm2: f32) -> vec2i {
     return vec2i(min(pixels, vec2f(size())));
 }
 
-// exp(−d²/2v); a variance of nothing weighs the pixel itself alone.
+// [LS15] Eq. 10, undivided: exp(−d²/2v). A variance of nothing weighs the pixel itself alone.
 fn weight(distance2_mm2: f32, variance_mm2: f32) -> f32 {
     return exp(-0.5 * distance2_mm2 / max(variance_mm2, 1e-12));
 }
@@ -244,7 +253,7 @@ fn distance2(a: vec3f, b: vec3f) -> f32 {
     return dot(d, d);
 }
 
-// E·A and A; nothing where the light is no number, so that it goes no further.
+// E·A and A, the terms of [M10]'s weighted mean. NaN and infinity weigh nothing.
 @fragment
 fn fs_source(vertex: Vertex) -> @location(0) vec4f {
     let pixel = vec2i(vertex.position.xy);
@@ -260,7 +269,7 @@ fn fs_source(vertex: Vertex) -> @location(0) vec4f {
     return vec4f(light * area, area);
 }
 
-// First pass: along the row, unnormalised, so that the area enters once.
+// First pass, [LS15] Eq. 12: along the row, unnormalised, so that the area enters once.
 @fragment
 fn fs_rows(vertex: Vertex) -> @location(0) vec4f {
     let pixel = vec2i(vertex.position.xy);
@@ -296,8 +305,8 @@ struct Steps {
     rho: vec3f,
 }
 
-// Of a covariance, xx, xy and yy in px²: [S1874], by vectors u + v + w = 0 of which no two are at less than a right
-// angle as the covariance measures it.
+// [S1874] of a covariance, xx, xy and yy in px²: by vectors u + v + w = 0 of which no two are at less than a
+// right angle as the covariance measures it.
 fn along_steps(c: vec3f) -> Steps {
     let covariance = mat2x2f(c.x, c.y, c.y, c.z);
     var u = vec2f(1.0, 0.0);
@@ -327,19 +336,19 @@ fn turned(v: vec2f) -> vec2i {
     return vec2i(vec2f(-v.y, v.x));
 }
 
-// A small kernel on any slope: three taps along each of three steps, which pass a wave of 1.1 rad a step as their
-// variance asks. What is a little off the plane weighs as the plane does at that distance; what is far off, nothing.
+// A small kernel on any slope: three taps along each of three steps, which pass WAVE as their variance asks.
+// What is a little off the plane weighs as the plane does at that distance; what is far off, nothing.
 fn small(pixel: vec2i, here: Point, lattice: vec3f, steps: Steps) -> vec4f {
-    // w with 1 − 2w(1 − cos 1.1) = e^(−1.1² ρ/2), as a series since of no variance nothing may be left.
-    let x = 0.605 * steps.rho;
-    let w = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0))) / 1.09281;
+    // w with 1 − 2w(1 − cos ω) = e^(−ω²ρ/2), as a series since of no variance nothing may be left.
+    let x = 0.5 * WAVE * WAVE * steps.rho;
+    let w = x * (1.0 - x * (0.5 - x * (1.0 / 6.0 - x / 24.0))) / (2.0 - 2.0 * COS_WAVE);
     let exponents = log(max(w / (1.0 - 2.0 * w), vec3f(1e-30)));
     let last = size() - 1;
     var total = vec4f(0.0);
     for (var i = 0; i < 27; i++) {
         let n = vec3i(i % 3, (i / 3) % 3, i / 9) - 1;
         let exponent = dot(vec3f(abs(n)), exponents);
-        // e⁻⁶⁰ is nothing: of no variance the pixel alone is left, and where one of the steps has none, nine taps.
+        // e⁻⁶⁰ is nothing: of no variance the pixel alone is left, and where a step has none, nine taps.
         if exponent < -60.0 {
             continue;
         }
@@ -370,27 +379,28 @@ struct Center {
     // Whether the first pass was so wide that the pixel nearest to a tap can stand for it.
     wide: bool,
     variance_mm2: f32,
-    // The Gaussian's: of a little, rows may stray further.
+    // The Gaussian's: of a little, rows may lie further off the plane.
     largest_weight: f32,
 }
 
-// Marks a row that strays: its sum was weighed from a pixel far off the center's tangent plane, on
-// another layer, around a sharp bend or off the surface.
-const STRAYS = vec4f(0.0, 0.0, 0.0, -1.0);
+// Marks a row whose sum was weighed from a pixel far off the center's tangent plane: on another layer,
+// around a sharp bend or off the surface.
+const OFF_PLANE = vec4f(0.0, 0.0, 0.0, -1.0);
 
 // The sum of the row of pixel q as the center weighs it, q being δ = `delta` pixels off the sheared
 // line and `dy` rows off the center: by the distance without its part M₀₀δ², which the first pass
 // has spent.
 fn row_of(q: vec2i, dy: f32, delta: f32, center: Center) -> vec4f {
     if q.x < 0 || q.x >= size().x {
-        return STRAYS;
+        return OFF_PLANE;
     }
     let there = point(q);
     let d2 = max(distance2(there.mm, center.point.mm) - center.m00 * delta * delta, 0.0);
     let plane2 = center.m11 * dy * dy;
     if there.profile != center.point.profile
-        || abs(d2 - plane2) * center.largest_weight > BEND * min(plane2, d2) + STRAY * center.variance_mm2 {
-        return STRAYS;
+        || abs(d2 - plane2) * center.largest_weight
+            > OFF_PLANE_OF_DISTANCE2 * min(plane2, d2) + OFF_PLANE_OF_VARIANCE * center.variance_mm2 {
+        return OFF_PLANE;
     }
     return weight(d2, center.variance_mm2) * textureLoad(rows, q, 0);
 }
@@ -404,7 +414,7 @@ fn row_at(y: i32, center: Center) -> vec4f {
         let nearest = sign(dx) * floor(abs(dx) + 0.5);
         return row_of(vec2i(center.pixel.x + i32(nearest), y), dy, nearest - dx, center);
     }
-    // A pixel that weighs nothing must not tell whether the row strays.
+    // A pixel that weighs nothing must not tell whether the row is off the plane.
     let at = select(dx, round(dx), abs(dx - round(dx)) < NEGLIGIBLE_PX);
     let q = vec2i(center.pixel.x + i32(floor(at)), y);
     let f = fract(at);
@@ -413,12 +423,12 @@ fn row_at(y: i32, center: Center) -> vec4f {
         return left;
     }
     let right = row_of(q + vec2i(1, 0), dy, 1.0 - f, center);
-    return select(mix(left, right, f), STRAYS, left.a < 0.0 || right.a < 0.0);
+    return select(mix(left, right, f), OFF_PLANE, left.a < 0.0 || right.a < 0.0);
 }
 
-// Second pass: over the rows along the sheared step (−κ, 1), which completes the square
-// M₀₀(dx + κ dy)² + (M₁₁ − κ²M₀₀)dy². Rows that stray are weighed anew from the center, in a loop
-// of their own, since most pixels have few.
+// Second pass, [LS15] Eq. 12: over the rows along the sheared step (−κ, 1), which completes the square
+// M₀₀(dx + κ dy)² + (M₁₁ − κ²M₀₀)dy². Rows off the plane are weighed anew from the center, in a loop of
+// their own, since most pixels have few.
 fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32, largest_weight: f32) -> vec4f {
     let m11 = m.area * m.area / m.m00;
     let variance_mm2 = lattice_variance(v, rows_of(m.lattice).y);
@@ -427,18 +437,18 @@ fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32, larg
     let first = max(pixel.y - reach.y, 0);
     let last = min(pixel.y + reach.y, size().y - 1);
     var total = vec4f(0.0);
-    var first_stray = last + 1;
-    var last_stray = first - 1;
+    var first_off = last + 1;
+    var last_off = first - 1;
     for (var y = first; y <= last; y++) {
         let sum_of_row = row_at(y, center);
         if sum_of_row.a < 0.0 {
-            first_stray = min(first_stray, y);
-            last_stray = y;
+            first_off = min(first_off, y);
+            last_off = y;
         } else {
             total += sum_of_row;
         }
     }
-    for (var y = first_stray; y <= last_stray; y++) {
+    for (var y = first_off; y <= last_off; y++) {
         if row_at(y, center).a < 0.0 {
             let up = f32(y - pixel.y) / f32(reach.y);
             let across = i32(ceil(f32(reach.x) * sqrt(1.0 - up * up)));
@@ -448,6 +458,7 @@ fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32, larg
     return total;
 }
 
+// [LS15] Eq. 11: adds one Gaussian's part, divided by its own mass, to those before it.
 @fragment
 fn fs_sum(vertex: Vertex) -> @location(0) vec4f {
     let pixel = vec2i(vertex.position.xy);

@@ -284,6 +284,12 @@ mod tests {
     use crate::wgsl::assert_layout;
 
     #[test]
+    fn constants_are_those_of_the_shader() {
+        let slots = crate::wgsl::constant(SHADER, "MAX_GAUSSIANS");
+        assert_eq!(slots as usize, Profile::MAX_GAUSSIANS);
+    }
+
+    #[test]
     fn settings_lie_as_the_shader_has_them() {
         assert_layout!(
             SHADER,
