@@ -254,7 +254,7 @@ fn rounded(mut weights: Vec<f64>) -> Vec<f64> {
 fn extend(profiles: &mut [Vec<Mixture>], kernels: &Kernels, max_error: f32) {
     let (first, per_level) = (1 + kernels.fine.len(), kernels.coarse.len());
     for row in profiles.iter_mut().flatten() {
-        row.weights.resize(first + MAX_LEVELS * per_level, [0.0; 3]);
+        row.weights.resize(Weights::slots(kernels), [0.0; 3]);
     }
     let octave = ROWS_PER_OCTAVE as usize;
     if profiles[0].len() < octave {

@@ -1,5 +1,7 @@
 //! The weights of the blurs of a pyramid, as they are drawn with.
 
+use std::fmt;
+
 use glam::{Vec3, Vec4};
 
 use super::Row;
@@ -20,7 +22,8 @@ pub(crate) struct Weights {
     pub kernels: Kernels,
     /// Levels above the frame.
     pub levels: usize,
-    first_octave: f64,
+    /// log₂ of the pixels per mm of the first row.
+    pub(super) first_octave: f64,
     /// A profile's rows.
     pub profiles: Vec<Vec<Row>>,
 }
@@ -69,7 +72,12 @@ impl Weights {
         weights
     }
 
-    /// log₂ of the pixels per mm of the first row.
+    /// How many weights a row has.
+    pub(super) fn slots(kernels: &Kernels) -> usize {
+        1 + kernels.fine.len() + MAX_LEVELS * kernels.coarse.len()
+    }
+
+    /// As shaders have it.
     pub fn first_octave(&self) -> f32 {
         self.first_octave as f32
     }
@@ -153,5 +161,20 @@ impl Weights {
     pub fn predicted_error(&self) -> f32 {
         let rows = self.profiles.iter().flatten();
         rows.map(|r| r.predicted_error).fold(0.0, f32::max)
+    }
+}
+
+/// The name of a set of blurs, by which a file tells which one its weights are for.
+impl fmt::Display for Kernels {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for (what, kinds) in [("the frame", &self.fine), ("; each level", &self.coarse)] {
+            write!(f, "{what}:")?;
+            for (j, blur) in kinds.blurs().enumerate() {
+                let comma = if j > 0 { "," } else { "" };
+                let taps = blur.shape.count();
+                write!(f, "{comma} {} px² by {taps} taps", blur.variance_px2)?;
+            }
+        }
+        Ok(())
     }
 }
