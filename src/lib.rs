@@ -32,7 +32,7 @@ mod exact;
 mod frame;
 mod gpu;
 mod optics;
-mod plan;
+pub mod plan;
 mod profile;
 mod pyramid;
 mod screen_space;
@@ -43,7 +43,7 @@ mod wgsl;
 
 pub use error::Error;
 pub use frame::{Frame, Output, Viewport};
-pub use plan::{DEFAULT_MAX_ERROR, Plan, Row};
+pub use plan::{DEFAULT_MAX_ERROR, Plan};
 pub use profile::{Gaussian, Profile};
 pub use screen_space::{ScreenSpace, View};
 pub use texture_space::{Atlas, TextureSpace};
