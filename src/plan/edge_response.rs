@@ -103,7 +103,8 @@ fn length([a, b]: [i32; 2]) -> f64 {
 
 /// ½(1 + erf(x/√2v)), a unit edge that a Gaussian has passed over.
 fn step(x: f64, variance: f64) -> f64 {
-    if variance == 0.0 {
+    // erfc(6) is less than the last digit of 1.
+    if x.abs() >= 6.0 * (2.0 * variance).sqrt() {
         return f64::from(x > 0.0);
     }
     0.5 * erfc(-x / (2.0 * variance).sqrt())

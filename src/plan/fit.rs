@@ -27,31 +27,36 @@ const BETWEEN: [f64; 3] = [0.25, 0.5, 0.75];
 pub(super) const STEPS: f64 = 1e5;
 
 /// The weights of these blurs whose error is the least, without blurs that `max_error` does not ask for.
-/// Where no weights keep it, [`Weights::predicted_error`] is above it.
-pub(super) fn fit(profiles: &[Profile], max_error: f32, kernels: Kernels) -> Weights {
+/// [`Weights::predicted_error`] may be above it. None where that is above `hopeless`, as soon as it is known.
+pub(super) fn fit(
+    profiles: &[Profile],
+    max_error: f32,
+    kernels: Kernels,
+    hopeless: f32,
+) -> Option<Weights> {
     let responses = Responses::new(&kernels, FITTED_LEVELS);
     let (first_octave, rows) = scales(profiles);
     let mut fitted: Vec<Vec<Mixture>> = Vec::new();
     for (i, profile) in profiles.iter().enumerate() {
         // Several heads may well have the same skin.
-        let rows = match profiles[..i].iter().position(|p| p == profile) {
+        let mixtures = match profiles[..i].iter().position(|p| p == profile) {
             Some(same) => fitted[same].clone(),
             None => {
                 let fit = Fit {
-                    columns: &responses.columns,
-                    variances_px2: kernels.variances_px2(FITTED_LEVELS),
-                    square: kernels.fine.square_px2.map(|_| kernels.fine.len()),
+                    responses: &responses,
+                    kernels: &kernels,
+                    profile,
+                    first_octave,
                     max_error: max_error.into(),
                 };
-                let wanted = |row: f64| responses.wanted(profile, px_per_mm(first_octave, row));
-                let widest_px = |row: f64| widest_mm(profile) * px_per_mm(first_octave, row);
-                fit.rows(rows, wanted, widest_px)
+                fit.rows(rows, hopeless.into())?
             }
         };
-        fitted.push(rows);
+        fitted.push(mixtures);
     }
     extend(&mut fitted, &kernels, max_error);
-    Weights::new(kernels, first_octave, fitted)
+    let weights = Weights::new(kernels, first_octave, fitted);
+    (weights.predicted_error() <= hopeless).then_some(weights)
 }
 
 /// log₂ of the px/mm of the first row, and how many rows there are: from where the widest Gaussian of all is
@@ -84,154 +89,201 @@ type Channels<T> = [T; 3];
 
 const CHANNELS: Channels<usize> = [0, 1, 2];
 
-/// What the weights of a profile are found with.
+fn largest(errors: Channels<f64>) -> f64 {
+    errors.into_iter().fold(0.0, f64::max)
+}
+
+/// One profile by one set of blurs.
 struct Fit<'a> {
-    /// Of the light that stays, then of each blur: what it makes of each edge.
-    columns: &'a [Vec<f64>],
-    variances_px2: Vec<f64>,
-    /// The column of the blur that takes the square of the frame.
-    square: Option<usize>,
+    responses: &'a Responses,
+    kernels: &'a Kernels,
+    profile: &'a Profile,
+    first_octave: f64,
     max_error: f64,
 }
 
 impl Fit<'_> {
-    /// The weights of `count` rows, from what is wanted at a row, or between two, and how wide the widest
-    /// Gaussian is there.
-    fn rows(
-        &self,
-        count: usize,
-        wanted: impl Fn(f64) -> Channels<Vec<f64>>,
-        widest_px: impl Fn(f64) -> f64,
-    ) -> Vec<Mixture> {
-        let at: Vec<_> = (0..count).map(|i| wanted(i as f64)).collect();
-        let at = |i: usize, c: usize| Target::new(at[i][c].clone());
-        let after: Vec<_> = (0..count)
-            .map(|i| BETWEEN.map(|part| wanted(i as f64 + part)))
-            .collect();
-        // What is wanted at scales between row `first` and the next, of `share` of the weights of one of them
-        // when the other has those.
-        let between = |first: usize, c: usize, share: fn(f64) -> f64, other: &[f64]| {
-            let theirs = mix(self.columns, other);
-            let target = |(part, wanted): (&f64, &Channels<Vec<f64>>)| {
-                let share = share(*part);
-                let values = wanted[c]
-                    .iter()
-                    .zip(&theirs)
-                    .map(|(w, t)| w - (1.0 - share) * t);
-                Target {
-                    share,
-                    ..Target::new(values.collect())
-                }
-            };
-            BETWEEN
-                .iter()
-                .zip(&after[first])
-                .map(target)
-                .collect::<Vec<_>>()
-        };
-        let to_next = |i: usize, c: usize, next: &[f64]| between(i, c, |part| 1.0 - part, next);
-        let from_last = |i: usize, c: usize, last: &[f64]| between(i - 1, c, |part| part, last);
-
+    /// None if no weights keep an error of `hopeless`.
+    fn rows(&self, count: usize, hopeless: f64) -> Option<Vec<Mixture>> {
         // Each row by itself …
         let mut fits = Vec::new();
-        for i in 0..count {
-            fits.push(self.alone(&CHANNELS.map(|c| [at(i, c)]), widest_px(i as f64)));
-        }
-        let mut weights: Vec<_> = fits
-            .iter()
-            .map(|fits| CHANNELS.map(|c| fits[c].weights()))
-            .collect();
-        let error = |weights: &Channels<Vec<f64>>, i: usize| {
-            CHANNELS.map(|c| largest_residual(self.columns, &weights[c], &[at(i, c)]))
+        let mut goals = Goals {
+            columns: &self.responses.columns,
+            at: Vec::new(),
+            between: Vec::new(),
         };
-        let errors: Vec<_> = (0..count).map(|i| error(&weights[i], i)).collect();
-
-        // … then so that none is further off between it and those before and after it than at either.
+        let mut weights: Vec<Channels<Vec<f64>>> = Vec::new();
+        let mut errors = Vec::new();
         for i in 0..count {
+            goals.at.push(self.wanted(i as f64));
+            let fit = self.alone(i, &CHANNELS.map(|c| [goals.at(i, c)]));
+            weights.push(CHANNELS.map(|c| fit[c].weights()));
+            errors.push(goals.errors_at(i, &weights[i]));
+            if largest(errors[i]) > hopeless {
+                return None;
+            }
+            fits.push(fit);
+        }
+        // … then so that none is further off on the way to its neighbours than there or here.
+        let between = |i| BETWEEN.map(|part| self.wanted(i as f64 + part));
+        goals.between = (0..count - 1).map(between).collect();
+        for (i, fit) in fits.iter_mut().enumerate() {
             let targets = CHANNELS.map(|c| {
-                let mut targets = vec![at(i, c)];
+                let mut targets = vec![goals.at(i, c)];
                 let mut add = |other: usize, between: Vec<Target>| {
-                    let allowance = (errors[other][c] - errors[i][c]).max(0.0);
+                    let allowance = f64::max(0.0, errors[other][c] - errors[i][c]);
                     targets.extend(between.into_iter().map(|t| Target { allowance, ..t }));
                 };
                 if i > 0 {
-                    add(i - 1, from_last(i, c, &weights[i - 1][c]));
+                    add(i - 1, goals.since_last(i, c, &weights[i - 1][c]));
                 }
                 if i + 1 < count {
-                    add(i + 1, to_next(i, c, &weights[i + 1][c]));
+                    add(i + 1, goals.until_next(i, c, &weights[i + 1][c]));
                 }
                 targets
             });
             for c in CHANNELS {
-                fits[i][c].solve(self.columns, &targets[c], f64::INFINITY);
+                fit[c].solve(goals.columns, &targets[c], f64::INFINITY);
             }
-            self.leave_out_specks(&mut fits[i], &targets);
-            weights[i] = CHANNELS.map(|c| rounded(fits[i][c].weights()));
+            self.leave_out_specks(fit, &targets);
+            weights[i] = CHANNELS.map(|c| rounded(fit[c].weights()));
         }
+        Some((0..count).map(|i| goals.mixture(i, &weights)).collect())
+    }
 
-        let largest = |errors: Channels<f64>| errors.into_iter().fold(0.0, f64::max);
-        let errors: Vec<f64> = (0..count).map(|i| largest(error(&weights[i], i))).collect();
-        let mut unscattered = vec![0.0; self.columns.len()];
-        unscattered[0] = 1.0;
-        let unscattered = CHANNELS.map(|_| unscattered.clone());
-        let mixture = |i: usize| {
-            let until_next = weights.get(i + 1).map_or(0.0, |next| {
-                let between = |c: usize| to_next(i, c, &next[c]);
-                let between =
-                    CHANNELS.map(|c| largest_residual(self.columns, &weights[i][c], &between(c)));
-                largest(between).max(errors[i + 1])
-            });
-            let [r, g, b] = &weights[i];
-            Mixture {
-                weights: (0..r.len())
-                    .map(|j| [r[j], g[j], b[j]].map(|w| w as f32))
-                    .collect(),
-                predicted_error: errors[i].max(until_next) as f32,
-                unscattered_error: largest(error(&unscattered, i)) as f32,
-            }
-        };
-        (0..count).map(mixture).collect()
+    fn px_per_mm(&self, row: f64) -> f64 {
+        px_per_mm(self.first_octave, row)
+    }
+
+    fn wanted(&self, row: f64) -> Channels<Vec<f64>> {
+        self.responses.wanted(self.profile, self.px_per_mm(row))
     }
 
     /// The fit of one row, without the square of the frame where the error does not ask for it.
-    fn alone(&self, targets: &Channels<[Target; 1]>, widest_px: f64) -> Channels<Minimax> {
+    fn alone(&self, row: usize, targets: &Channels<[Target; 1]>) -> Channels<Minimax> {
+        let columns = &self.responses.columns;
+        let widest_px = WIDER * widest_mm(self.profile) * self.px_per_mm(row as f64);
         // Level 1 stays for profiles of hardly any width.
-        let widest_px2 = (WIDER * widest_px).powi(2).max(4.0);
-        let fits = |used: &dyn Fn(usize) -> bool, limit: f64| {
-            let used = |j: usize| self.variances_px2[j] <= widest_px2 && used(j);
-            let mut fits = CHANNELS.map(|_| Minimax::new(self.columns.len(), used));
-            let kept = fits
-                .iter_mut()
-                .zip(targets)
-                .all(|(fit, target)| fit.solve(self.columns, target, limit));
-            (fits, kept)
+        let widest_px2 = widest_px.powi(2).max(4.0);
+        let variances_px2 = self.kernels.variances_px2(FITTED_LEVELS);
+        let square = self
+            .kernels
+            .fine
+            .square_px2
+            .map(|_| self.kernels.fine.len());
+        let fit = |without: Option<usize>, limit: f64| {
+            let used = |j: usize| variances_px2[j] <= widest_px2 && Some(j) != without;
+            let mut fit = CHANNELS.map(|_| Minimax::new(columns.len(), used));
+            let kept = CHANNELS
+                .into_iter()
+                .all(|c| fit[c].solve(columns, &targets[c], limit));
+            (fit, kept)
         };
-        if self.square.is_some() {
+        if square.is_some() {
             // Between two rows the error is a little larger than at either.
-            let (fits, kept) = fits(&|j| Some(j) != self.square, 0.9 * self.max_error);
+            let (fit, kept) = fit(square, 0.9 * self.max_error);
             if kept {
-                return fits;
+                return fit;
             }
         }
-        fits(&|_| true, f64::INFINITY).0
+        fit(None, f64::INFINITY).0
     }
 
     /// Leaves out the blurs that are worth less than [`SPECK`], from the widest on.
-    fn leave_out_specks(&self, fits: &mut Channels<Minimax>, targets: &Channels<Vec<Target>>) {
+    fn leave_out_specks(&self, fit: &mut Channels<Minimax>, targets: &Channels<Vec<Target>>) {
+        let columns = &self.responses.columns;
         let limits = CHANNELS.map(|c| {
-            let error = largest_residual(self.columns, &fits[c].weights(), &targets[c]);
+            let error = largest_residual(columns, &fit[c].weights(), &targets[c]);
             (error + SPECK * self.max_error).min(self.max_error.max(error))
         });
-        for j in (1..self.columns.len()).rev() {
-            let mut without = fits.clone();
+        for j in (1..columns.len()).rev() {
+            let mut without = fit.clone();
             let kept = CHANNELS.into_iter().all(|c| {
                 let had = without[c].weights()[j] > 0.0;
                 without[c].leave_out(j);
-                !had || without[c].solve(self.columns, &targets[c], limits[c])
+                !had || without[c].solve(columns, &targets[c], limits[c])
             });
             if kept {
-                *fits = without;
+                *fit = without;
             }
+        }
+    }
+}
+
+/// What a profile makes of the edges: at each row, and at scales between it and the next.
+struct Goals<'a> {
+    /// Of the light that stays, then of each blur: what it makes of them.
+    columns: &'a [Vec<f64>],
+    at: Vec<Channels<Vec<f64>>>,
+    between: Vec<[Channels<Vec<f64>>; BETWEEN.len()]>,
+}
+
+impl Goals<'_> {
+    fn at(&self, row: usize, c: usize) -> Target {
+        Target::new(self.at[row][c].clone())
+    }
+
+    /// For the weights of a row, if those of the next are `next`.
+    fn until_next(&self, row: usize, c: usize, next: &[f64]) -> Vec<Target> {
+        self.on_the_way(row, c, next, |part| 1.0 - part)
+    }
+
+    /// For the weights of a row, if those of the one before are `last`.
+    fn since_last(&self, row: usize, c: usize, last: &[f64]) -> Vec<Target> {
+        self.on_the_way(row - 1, c, last, |part| part)
+    }
+
+    /// From row `first` to the next, for that of both which has `share` of the weights; the other has `other`.
+    fn on_the_way(
+        &self,
+        first: usize,
+        c: usize,
+        other: &[f64],
+        share: fn(f64) -> f64,
+    ) -> Vec<Target> {
+        let other = mix(self.columns, other);
+        let target = |(part, wanted): (f64, &Channels<Vec<f64>>)| {
+            let share = share(part);
+            let rest = wanted[c]
+                .iter()
+                .zip(&other)
+                .map(|(w, o)| w - (1.0 - share) * o);
+            Target {
+                share,
+                ..Target::new(rest.collect())
+            }
+        };
+        BETWEEN
+            .into_iter()
+            .zip(&self.between[first])
+            .map(target)
+            .collect()
+    }
+
+    fn errors_at(&self, row: usize, weights: &Channels<Vec<f64>>) -> Channels<f64> {
+        CHANNELS.map(|c| largest_residual(self.columns, &weights[c], &[self.at(row, c)]))
+    }
+
+    /// A row, with its errors.
+    fn mixture(&self, row: usize, weights: &[Channels<Vec<f64>>]) -> Mixture {
+        let here = &weights[row];
+        let until_next = weights.get(row + 1).map_or(0.0, |next| {
+            let errors = CHANNELS.map(|c| {
+                let targets = self.until_next(row, c, &next[c]);
+                largest_residual(self.columns, &here[c], &targets)
+            });
+            largest(errors).max(largest(self.errors_at(row + 1, next)))
+        });
+        let mut stays = vec![0.0; self.columns.len()];
+        stays[0] = 1.0;
+        let stays = CHANNELS.map(|_| stays.clone());
+        let [r, g, b] = here;
+        Mixture {
+            weights: (0..r.len())
+                .map(|j| [r[j], g[j], b[j]].map(|w| w as f32))
+                .collect(),
+            predicted_error: largest(self.errors_at(row, here)).max(until_next) as f32,
+            unscattered_error: largest(self.errors_at(row, &stays)) as f32,
         }
     }
 }
@@ -328,7 +380,7 @@ mod tests {
             let responses = Responses::new(&kernels, FITTED_LEVELS);
             for profile in profiles() {
                 let since = std::time::Instant::now();
-                let fit = fit(&[profile], 1.0 / 255.0, kernels);
+                let fit = fit(&[profile], 1.0 / 255.0, kernels, f32::INFINITY).unwrap();
                 println!(
                     "{:.6} predicted, {:?}",
                     fit.predicted_error(),
@@ -372,7 +424,13 @@ mod tests {
     #[test]
     fn equal_profiles_have_equal_weights() {
         let other = profiles()[3];
-        let fit = fit(&[Profile::SKIN, other, Profile::SKIN], 0.01, KERNELS[0]);
+        let fit = fit(
+            &[Profile::SKIN, other, Profile::SKIN],
+            0.01,
+            KERNELS[0],
+            1.0,
+        )
+        .unwrap();
         assert_eq!(fit.profiles[0], fit.profiles[2]);
         assert_ne!(fit.profiles[0], fit.profiles[1]);
     }

@@ -18,7 +18,7 @@ use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use crate::{Error, Profile, validate};
-use kernels::KERNELS;
+use kernels::{KERNELS, Kernels};
 pub(crate) use kernels::{Kinds, Shape, own_blur};
 use stored::Stored;
 pub(crate) use weights::Weights;
@@ -103,19 +103,22 @@ impl Plan {
     pub fn new(profiles: &[Profile], max_error: f32) -> Result<Self, Error> {
         validate::profiles(profiles)?;
         check_max_error(max_error)?;
-        let mut reachable = f32::INFINITY;
-        for kernels in KERNELS {
-            let weights = fit::fit(profiles, max_error, kernels);
-            let error = weights.predicted_error();
-            if error <= max_error {
-                return Ok(Self::of(profiles, max_error, weights));
+        let [cheaper @ .., most_exact] = &KERNELS;
+        let fit = |kernels: &Kernels, hopeless| fit::fit(profiles, max_error, *kernels, hopeless);
+        let weights = cheaper
+            .iter()
+            .find_map(|kernels| fit(kernels, max_error))
+            // How far these are off is the least that can be kept.
+            .or_else(|| fit(most_exact, f32::INFINITY));
+        match weights {
+            Some(weights) if weights.predicted_error() <= max_error => {
+                Ok(Self::of(profiles, max_error, weights))
             }
-            reachable = reachable.min(error);
+            weights => Err(Error::MaxError {
+                got: max_error,
+                reachable: weights.map_or(f32::INFINITY, |w| w.predicted_error()),
+            }),
         }
-        Err(Error::MaxError {
-            got: max_error,
-            reachable,
-        })
     }
 
     /// The exact effect, whatever it takes.

@@ -4,11 +4,10 @@
 //! cargo test --release --lib write_skin -- --ignored
 //! ```
 
-use super::kernels::KERNELS;
 use super::stored::Stored;
 
 pub(super) const SKIN: Stored = Stored {
-    kernels: KERNELS[1],
+    set: 1,
     max_error: 1.0 / 255.0,
     first_octave: -5.444736756411452,
     rows: &[
@@ -216,7 +215,7 @@ pub(super) const SKIN: Stored = Stored {
 };
 
 pub(super) const SKIN_FAST: Stored = Stored {
-    kernels: KERNELS[0],
+    set: 0,
     max_error: 1.0 / 100.0,
     first_octave: -5.444736756411452,
     rows: &[

@@ -1,11 +1,12 @@
 //! Plans that lie in the source: their weights, and how these become a plan.
 
-use super::kernels::Kernels;
+use super::kernels::KERNELS;
 use super::weights::{Mixture, Weights};
 
 /// The weights of one profile.
 pub(super) struct Stored {
-    pub kernels: Kernels,
+    /// Which of [`KERNELS`].
+    pub set: usize,
     pub max_error: f32,
     /// log₂ of the px/mm of the first row.
     pub first_octave: f64,
@@ -18,7 +19,8 @@ pub(super) type Row = (f32, f32, &'static [(usize, [u32; 3])]);
 
 impl Stored {
     pub fn weights(&self) -> Weights {
-        let slots = Weights::slots(&self.kernels);
+        let kernels = KERNELS[self.set];
+        let slots = Weights::slots(&kernels);
         let mixture = |(predicted_error, unscattered_error, stored): &Row| {
             let mut weights = vec![[0.0; 3]; slots];
             for (slot, steps) in *stored {
@@ -31,7 +33,7 @@ impl Stored {
             }
         };
         let rows = self.rows.iter().map(mixture).collect();
-        Weights::new(self.kernels, self.first_octave, vec![rows])
+        Weights::new(kernels, self.first_octave, vec![rows])
     }
 }
 
@@ -44,23 +46,14 @@ mod tests {
 
     const COMMAND: &str = "cargo test --release --lib write_skin -- --ignored";
 
-    /// What is stored, what it is for, the error it keeps.
-    fn stored() -> [(&'static str, &'static str, Plan, Plan); 2] {
-        let refit = |max_error: f32| Plan::new(&[Profile::SKIN], max_error).unwrap();
-        [
-            ("SKIN", "1.0 / 255.0", Plan::skin(), refit(1.0 / 255.0)),
-            (
-                "SKIN_FAST",
-                "1.0 / 100.0",
-                Plan::skin_fast(),
-                refit(1.0 / 100.0),
-            ),
-        ]
+    fn refit(max_error: f32) -> Plan {
+        Plan::new(&[Profile::SKIN], max_error).unwrap()
     }
 
     #[test]
     fn stored_plans_are_what_is_fitted() {
-        for (name, _, stored, refit) in stored() {
+        for (name, stored) in [("SKIN", Plan::skin()), ("SKIN_FAST", Plan::skin_fast())] {
+            let refit = refit(stored.max_error());
             let fitted = |plan: &Plan| {
                 (
                     plan.max_error(),
@@ -104,16 +97,17 @@ mod tests {
     fn write_skin() {
         let mut text = format!(
             "//! Weights of skin, as they were fitted. Written by\n//!\n//! ```text\n//! {COMMAND}\n//! ```\n\n\
-             use super::kernels::KERNELS;\nuse super::stored::Stored;\n"
+             use super::stored::Stored;\n"
         );
-        for (name, max_error, _, refit) in stored() {
+        for (name, white) in [("SKIN", 255), ("SKIN_FAST", 100)] {
+            let refit = refit(1.0 / white as f32);
             let weights = refit.weights().unwrap();
             let set = KERNELS.iter().position(|k| *k == weights.kernels).unwrap();
             let octave = weights.first_octave;
             write!(
                 text,
-                "\npub(super) const {name}: Stored = Stored {{\n    kernels: KERNELS[{set}],\n    \
-                 max_error: {max_error},\n    first_octave: {octave:?},\n    rows: &[\n"
+                "\npub(super) const {name}: Stored = Stored {{\n    set: {set},\n    \
+                 max_error: 1.0 / {white}.0,\n    first_octave: {octave:?},\n    rows: &[\n"
             )
             .unwrap();
             for row in refit.rows(0) {
