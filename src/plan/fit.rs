@@ -234,7 +234,7 @@ impl Goals<'_> {
         self.on_the_way(row - 1, c, last, |part| part)
     }
 
-    /// From row `first` to the next, for the one of both that has `share` there; the other's weights are `other`.
+    /// From row `first` to the next, for the one that has `share` of the weights there, given the other's.
     fn on_the_way(
         &self,
         first: usize,
