@@ -189,7 +189,8 @@ impl Fit<'_> {
         fit(None, f64::INFINITY).0
     }
 
-    /// Leaves out the blurs that are worth less than [`SPECK`], from the widest on.
+    /// Leaves out the blurs that are worth less than [`SPECK`] to every channel, from the widest on: one that
+    /// some channel needs costs the others nothing.
     fn leave_out_specks(&self, fit: &mut Channels<Minimax>, targets: &Channels<Vec<Target>>) {
         let columns = &self.responses.columns;
         let limits = CHANNELS.map(|c| {
@@ -233,7 +234,7 @@ impl Goals<'_> {
         self.on_the_way(row - 1, c, last, |part| part)
     }
 
-    /// From row `first` to the next, for that of both which has `share` of the weights; the other has `other`.
+    /// From row `first` to the next, for the one that has `share` of the weights there, given the other's.
     fn on_the_way(
         &self,
         first: usize,

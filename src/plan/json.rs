@@ -153,8 +153,8 @@ impl Plan {
     /// A plan from the JSON that [`to_json`](Self::to_json) writes.
     ///
     /// # Errors
-    /// Text that is not of this form; profiles that [`Profile::new`] refuses; blurs of another version; counts
-    /// that do not fit together; numbers out of their range, such as weights that are not 1 in all.
+    /// Text that is not of this form; profiles that [`Profile::new`] refuses; blurs of another version;
+    /// counts that do not fit together; numbers out of their range, such as weights that are not 1 in all.
     pub fn from_json(text: &str) -> Result<Self, Error> {
         let form: Form = serde_json::from_str(text).map_err(|e| Error::Json {
             input: "plan",
@@ -164,7 +164,7 @@ impl Plan {
         form.try_into()
     }
 
-    /// The plan as JSON, for [`from_json`](Self::from_json): to fit where a program is built, not where it runs.
+    /// The plan as JSON, for [`from_json`](Self::from_json): to fit it once, not wherever a program starts.
     pub fn to_json(&self) -> String {
         serde_json::json!(self).to_string()
     }

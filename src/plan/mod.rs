@@ -36,9 +36,10 @@ const EXACT_ERROR: f32 = 0.0005;
 ///
 /// A plan is made once for a set of profiles, not for each frame, and a clone shares its weights.
 /// [`skin`](Self::skin) is there at once; another profile takes some tenths of a second to
-/// [fit](Self::new). Every blur is a Gaussian of a fixed width *in pixels*, those of a level twice as wide as
-/// those of the level before; what changes with the scale is how much of each is taken. The weights are fitted
-/// so that the largest error on straight edges is the least, along the axes of the pixels, at 45° and at 27°:
+/// [fit](Self::new). Every blur is a Gaussian of a fixed width *in pixels*, those of a level twice as wide
+/// as those of the level before; what changes with the scale is how much of each is taken. The weights are
+/// fitted so that the largest error on straight edges is the least, along the axes of the pixels, at 45° and
+/// at 27°:
 /// edges soft by σ = 1 px against the closed form, hard ones against the visible integral. It holds up
 /// to the px/mm of the last of [`rows`](Self::rows), where a profile is as wide as the last level;
 /// beyond, blurs stay as wide as there. Layers, and detail of a pixel on steep slopes, may be off by

@@ -13,8 +13,8 @@ pub(super) struct Stored {
     pub rows: &'static [Row],
 }
 
-/// The predicted error, the unscattered one, and the weights that are not 0: for each slot those of red, green
-/// and blue, in 1/[`STEPS`](super::fit::STEPS).
+/// The predicted error, the unscattered one, and the weights that are not 0: for each slot those of red,
+/// green and blue, in 1/[`STEPS`](super::fit::STEPS).
 pub(super) type Row = (f32, f32, &'static [(usize, [u32; 3])]);
 
 impl Stored {
@@ -96,7 +96,8 @@ mod tests {
     #[ignore = "writes src/plan/skin.rs"]
     fn write_skin() {
         let mut text = format!(
-            "//! Weights of skin, as they were fitted. Written by\n//!\n//! ```text\n//! {COMMAND}\n//! ```\n\n\
+            "//! Weights of skin, as they were fitted. Written by\n//!\n\
+             //! ```text\n//! {COMMAND}\n//! ```\n\n\
              use super::stored::Stored;\n"
         );
         for (name, white) in [("SKIN", 255), ("SKIN_FAST", 100)] {
