@@ -12,6 +12,8 @@ mod error;
 mod frame;
 mod gaussian_sum;
 mod input;
+#[cfg(feature = "physics")]
+pub mod physics;
 mod plan;
 mod planned;
 mod profile;

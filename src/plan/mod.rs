@@ -1,7 +1,7 @@
 //! The plan: what work keeps a stated error.
 
 mod kernels;
-mod nnls;
+pub(crate) mod nnls;
 mod response;
 mod weights;
 

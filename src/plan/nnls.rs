@@ -3,7 +3,7 @@
 
 /// The x ≥ 0 of the least |Ax − b|², from the normal equations: `gram` = AᵀA, row by row, and
 /// `rhs` = Aᵀb. C. L. Lawson & R. J. Hanson, *Solving least squares problems*, 1974, ch. 23.
-fn nnls(gram: &[Vec<f64>], rhs: &[f64]) -> Vec<f64> {
+pub(crate) fn nnls(gram: &[Vec<f64>], rhs: &[f64]) -> Vec<f64> {
     let n = rhs.len();
     let mut x = vec![0.0; n];
     let mut free = vec![false; n];
