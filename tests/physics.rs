@@ -48,3 +48,75 @@ fn table() {
         println!("{s} {:+.6}", Transport::default().transform(&m, s).unwrap() - r);
     }
 }
+
+#[test]
+fn aniso() {
+    let three = |c: usize| {
+        let epi = ([0.21, 0.21, 0.50], [4.8, 6.0, 6.5]);
+        let up = ([0.016, 0.019, 0.030], [3.2, 4.0, 4.6]);
+        let bl = ([0.0085, 0.1, 2.5], [0.45, 0.47, 0.48]);
+        vec![
+            Layer::isotropic(epi.0[c], epi.1[c]).thick(0.25).with_g(0.8),
+            Layer::isotropic(up.0[c], up.1[c]).thick(1.0).with_g(0.8),
+            Layer::isotropic(bl.0[c], bl.1[c]).with_g(0.8),
+        ]
+    };
+    let h = |a, s| vec![Layer::isotropic(a, s).with_g(0.8)];
+    for (l, r) in [
+        (h(0.032, 0.74), 0.39361),
+        (h(0.17, 0.88), 0.16909),
+        (h(0.48, 1.01), 0.07846),
+        (three(0), 0.50344),
+        (three(1), 0.48408),
+        (three(2), 0.35708),
+    ] {
+        let m = Medium::new(&l, 1.4).unwrap();
+        for order in 0..3 {
+            let t = Transport { order, ..Default::default() };
+            let start = Instant::now();
+            let got = t.response(&m).unwrap();
+            let ms = start.elapsed().as_secs_f64() * 1e3;
+            println!("L{order} {ms:6.1} ms R {:+.5} ({:+.2} %) R(.3) {} R(1) {}", got.albedo() - r, 100. * (got.albedo() / r - 1.), got.radial(0.2826), got.radial(0.94));
+        }
+    }
+}
+
+#[test]
+fn fits() {
+    let skin1 = [(0.032, 0.74), (0.17, 0.88), (0.48, 1.01)];
+    let skin2 = [(0.013, 1.09), (0.070, 1.59), (0.145, 1.79)];
+    let marble = [(0.0021, 2.19), (0.0041, 2.62), (0.0071, 3.0)];
+    for (name, rgb) in [("skin1", skin1), ("skin2", skin2), ("marble", marble)] {
+        let media = rgb.map(|(a, s)| Medium::homogeneous(Layer::isotropic(a, s), 1.4).unwrap());
+        for which in 0..4 {
+            let responses = media.each_ref().map(|m| match which {
+                0 => Transport::default().response(m).unwrap(),
+                1 => Diffusion::PhotonBeam.response(m).unwrap(),
+                2 => Diffusion::BetterDipole.response(m).unwrap(),
+                _ => Diffusion::Dipole.response(m).unwrap(),
+            });
+            print!("{name} {which} {:.5?}", responses.each_ref().map(|r| r.albedo()));
+            for k in [3, 4, 5, 6, 8] {
+                let start = Instant::now();
+                let fit = Fit::new(&responses, k).unwrap();
+                let ms = start.elapsed().as_secs_f64() * 1e3;
+                print!(" k={k} {:.4} ({ms:.0} ms)", fit.worst());
+                if k == 8 { print!("floor {:.5?}", fit.floor); }
+            }
+            println!();
+        }
+    }
+    let g = Layer::isotropic(0.17, 0.88);
+    for r in [0.1, 0.3, 1.0, 3.0] {
+        println!("PBD {:.6} SS {:.6} better {:.6}", Diffusion::PhotonBeam.radial(&g, 1.4, r), single_scattering(&g, 1.4, r), Diffusion::BetterDipole.radial(&g, 1.4, r));
+    }
+    for (a, s) in skin1 {
+        let l = Layer::isotropic(a, s);
+        for r in [0.1, 0.3, 1.0, 3.0] { print!("{:.7} ", Diffusion::Dipole.radial(&l, 1.3, r)); }
+        let m = Medium::homogeneous(l, 1.3).unwrap();
+        println!("dipole {:.5}", Diffusion::Dipole.response(&m).unwrap().albedo());
+        let m = Medium::homogeneous(l, 1.4).unwrap();
+        let p = Diffusion::PhotonBeam.response(&m).unwrap();
+        println!("PBD total {:.5} E {:?}", p.albedo(), [0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0].map(|x| (p.edge(x) * 1e4).round() / 1e4));
+    }
+}

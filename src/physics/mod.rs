@@ -1,11 +1,15 @@
 //! Profiles from what skin and other materials are made of.
 
 mod complex;
+mod diffusion;
+mod fit;
 mod medium;
 mod quadrature;
 mod response;
 mod transport;
 
+pub use diffusion::{Diffusion, single_scattering};
+pub use fit::Fit;
 pub use medium::{Layer, Medium};
 pub use quadrature::fresnel_inside;
 pub use response::Response;

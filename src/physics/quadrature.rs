@@ -54,8 +54,10 @@ pub(super) struct Direction {
     pub fresnel: f64,
 }
 
-/// Directions over the hemisphere: `n` up to the critical angle, `n` beyond it.
+/// Directions over the hemisphere, `n` to either side of the critical angle. They cluster at its ends, where
+/// Fresnel bends, and at μ = 0 and 1, where rays are long and waves stand still.
 pub(super) fn directions(n: usize, eta: f64) -> Vec<Direction> {
+    let (ends, slope) = (|t: f64| t * t * (3.0 - 2.0 * t), |t: f64| 6.0 * t * (1.0 - t));
     let critical = (1.0 - 1.0 / (eta * eta)).sqrt();
     let at = |mu: f64, weight: f64| Direction {
         mu,
@@ -64,7 +66,7 @@ pub(super) fn directions(n: usize, eta: f64) -> Vec<Direction> {
     };
     if eta == 1.0 {
         let nodes = gauss(2 * n).into_iter();
-        return nodes.map(|(t, w)| at(t * t, 2.0 * t * w)).collect();
+        return nodes.map(|(t, w)| at(ends(t), slope(t) * w)).collect();
     }
     let nodes = gauss(n);
     let beyond = nodes.iter().map(|(t, w)| Direction {
@@ -72,6 +74,6 @@ pub(super) fn directions(n: usize, eta: f64) -> Vec<Direction> {
         ..at(critical * t * t, critical * 2.0 * t * w)
     });
     let leaves = 1.0 - critical;
-    let within = nodes.iter().map(|(t, w)| at(critical + leaves * t * t, leaves * 2.0 * t * w));
+    let within = nodes.iter().map(|(t, w)| at(critical + leaves * ends(*t), leaves * slope(*t) * w));
     beyond.chain(within).collect()
 }

@@ -49,13 +49,17 @@ impl Default for Transport {
     }
 }
 
-/// Cells to an e-folding of depth, and directions to either side of the critical angle; see the table in
-/// docs/physics.md.
-const CELLS: f64 = 6.0;
-const DIRECTIONS: usize = 6;
+/// Cells to a mean free path at an interface: more where the wave is wide and much of the light has been
+/// scattered often, which takes few azimuths. docs/physics.md has what each of these numbers costs.
+const CELLS: [f64; 2] = [12.0, 4.0];
+/// With moments beyond the first, whose end costs R more than cells do.
+const MOMENT_CELLS: [f64; 2] = [6.0, 4.0];
+/// Directions to either side of the critical angle, and for light that was scattered once, which a sharp
+/// wave shows by a narrow cone alone.
+const DIRECTIONS: [usize; 2] = [6, 16];
 /// Frequencies to a decade, and the highest in mean free paths of the densest layer.
 const FREQUENCIES: f64 = 6.0;
-const HIGHEST: f64 = 40.0;
+const HIGHEST: f64 = 30.0;
 /// No medium has needed half of these.
 const MOST_AZIMUTHS: f64 = 1000.0;
 
@@ -196,11 +200,6 @@ impl Slab {
         (14.0 * free).max(diffuse.min(2e4 * free))
     }
 
-    /// Henyey & Greenstein's phase function from straight down to a cosine `mu` up.
-    fn phase_back(&self, mu: f64) -> f64 {
-        let g = self.layer.g;
-        (1.0 - g * g) / (4.0 * PI * (1.0 + g * g + 2.0 * g * mu).powf(1.5))
-    }
 }
 
 struct Cell {
@@ -210,8 +209,10 @@ struct Cell {
 
 struct Solver {
     slabs: Vec<Slab>,
-    cells: Vec<Cell>,
-    directions: Vec<Direction>,
+    /// Both meshes of [`CELLS`].
+    meshes: [Vec<Cell>; 2],
+    /// Both sets of [`DIRECTIONS`].
+    directions: [Vec<Direction>; 2],
     incidence: Incidence,
     order: usize,
     eta: f64,
@@ -246,8 +247,8 @@ impl Solver {
             }
         }
         Ok(Self {
-            cells: mesh(&slabs),
-            directions: directions(DIRECTIONS, medium.eta()),
+            meshes: if order == 0 { CELLS } else { MOMENT_CELLS }.map(|n| mesh(&slabs, n)),
+            directions: DIRECTIONS.map(|n| directions(n, medium.eta())),
             slabs,
             incidence,
             order,
@@ -267,9 +268,9 @@ impl Solver {
 
     fn solve(&self, s: f64) -> Split {
         match self.order {
-            0 => self.solve_basis(s, [(0, 0)]),
-            1 => self.solve_basis(s, [(0, 0), (1, 0), (1, 1)]),
-            _ => self.solve_basis(s, [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)]),
+            0 => self.solve_basis::<1, 1>(s, [(0, 0)]),
+            1 => self.solve_basis::<3, 6>(s, [(0, 0), (1, 0), (1, 1)]),
+            _ => self.solve_basis::<6, 21>(s, [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)]),
         }
     }
 
@@ -284,29 +285,34 @@ impl Solver {
         (0..n as usize).map(|l| ((l as f64 + 0.5) * FRAC_PI_2 / n).cos()).collect()
     }
 
-    /// One frequency, with the harmonics (l, m) of `basis`.
+    /// One frequency, with the B harmonics (l, m) of `basis`, of which there are P pairs.
     ///
     /// The unknowns are x = i^−m·L_lm, which makes all coefficients real: azimuths φ and π − φ give a term
     /// and its conjugate, times (−1)^(m + m′).
-    fn solve_basis<const B: usize>(&self, s: f64, basis: [(usize, usize); B]) -> Split {
-        let n = self.cells.len();
+    fn solve_basis<const B: usize, const P: usize>(
+        &self,
+        s: f64,
+        basis: [(usize, usize); B],
+    ) -> Split {
         let azimuths = self.azimuths(s);
-        let mut sums = Sums::<B>::new(n);
+        let coarse = azimuths.len() > 8 && self.incidence == Incidence::Normal;
+        let cells = &self.meshes[usize::from(coarse)];
+        let n = cells.len();
+        let mut sums = Sums::<B, P>::new(basis, n);
         let mut source = vec![[0.0; 2]; n];
         if self.incidence == Incidence::Cosine {
-            self.cosine_source(s, &azimuths, &mut source);
+            self.cosine_source(s, &azimuths, cells, &mut source);
         } else {
-            self.normal_source(&mut source);
+            self.normal_source(cells, &mut source);
         }
-        let mut once = 0.0;
         let mut rays: Vec<Ray> = vec![Ray::default(); n];
-        for d in &self.directions {
+        for d in &self.directions[0] {
             for cos_phi in &azimuths {
                 let sin_theta = (1.0 - d.mu * d.mu).sqrt();
                 let slant = 1.0 / d.mu;
                 let wave = s * sin_theta * cos_phi * slant;
                 let mut through = Complex::ONE;
-                for (ray, cell) in rays.iter_mut().zip(&self.cells) {
+                for (ray, cell) in rays.iter_mut().zip(cells) {
                     let sigma_t = self.slabs[cell.slab].sigma_t;
                     let x = Complex::new(sigma_t * slant, wave) * cell.thickness_mm;
                     *ray = Ray::new(x, through);
@@ -314,7 +320,7 @@ impl Solver {
                 }
                 let share = TAU * d.weight / azimuths.len() as f64;
                 let y = harmonics(basis, d.mu, sin_theta, *cos_phi);
-                sums.add(basis, &rays, y, share * slant, d.fresnel);
+                sums.add(&rays, y, share * slant, d.fresnel);
                 // What leaves: upward, where Y_lm is times (−1)^(l+m).
                 let leaves = share * (1.0 - d.fresnel);
                 for (emitted, ray) in sums.emitted.iter_mut().zip(&rays) {
@@ -324,39 +330,77 @@ impl Solver {
                         }
                     }
                 }
-                if self.incidence == Incidence::Normal {
-                    once += leaves * self.once(d.mu, wave);
-                }
             }
         }
-        self.finish(basis, &sums, &source, once)
+        let x = self.scatter(basis, cells, &sums, &source);
+        let [first, all] = x.map(|x| {
+            let mut sum = 0.0;
+            for (c, emitted) in sums.emitted.iter().enumerate() {
+                for (q, emitted) in emitted.iter().enumerate() {
+                    for (b, emitted) in emitted.iter().enumerate() {
+                        sum += self.scatters(&cells[c], basis[b]) * emitted * x[(c * 2 + q) * B + b];
+                    }
+                }
+            }
+            sum
+        });
+        let once = match self.incidence {
+            Incidence::Normal => self.once(s, &azimuths),
+            Incidence::Cosine => first,
+        };
+        Split { once, more: all - first }
     }
 
-    /// What light that came straight down and was scattered once sends up a ray to the surface, with the
-    /// exact phase function.
-    fn once(&self, mu: f64, wave: f64) -> f64 {
-        let mut through = Complex::ONE;
+    /// What a cell scatters of a harmonic, per mm² of its face.
+    fn scatters(&self, cell: &Cell, (l, _): (usize, usize)) -> f64 {
+        let slab = &self.slabs[cell.slab];
+        slab.sigma_s * slab.moments[l] * cell.thickness_mm
+    }
+
+    /// What of light that came straight down leaves after one event, with the exact phase function.
+    fn once(&self, s: f64, azimuths: &[f64]) -> f64 {
         let mut sum = 0.0;
-        for slab in &self.slabs {
-            let fade = Complex::new(slab.sigma_t * (1.0 + 1.0 / mu), wave);
-            let pass = if slab.thickness_mm == f64::INFINITY {
-                Complex::default()
-            } else {
-                (fade * slab.thickness_mm).exp_neg()
-            };
-            if slab.layer.sigma_s_per_mm > 0.0 {
-                let scattered = through * (Complex::ONE - pass) * fade.recip();
-                sum += slab.layer.sigma_s_per_mm * slab.phase_back(mu) * scattered.re;
+        for d in &self.directions[1] {
+            let slant = 1.0 / d.mu;
+            let leaves = TAU * d.weight * (1.0 - d.fresnel) / azimuths.len() as f64;
+            if leaves == 0.0 {
+                continue;
             }
-            through = through * pass;
+            for cos_phi in azimuths {
+                let wave = s * (1.0 - d.mu * d.mu).sqrt() * cos_phi * slant;
+                let mut through = Complex::ONE;
+                for slab in &self.slabs {
+                    let fade = Complex::new(slab.sigma_t * (1.0 + slant), wave);
+                    let pass = if slab.thickness_mm == f64::INFINITY {
+                        Complex::default()
+                    } else {
+                        (fade * slab.thickness_mm).exp_neg()
+                    };
+                    if slab.sigma_s > 0.0 {
+                        let scattered = through * (Complex::ONE - pass) * fade.recip();
+                        sum += leaves * self.back(slab, d.mu) * scattered.re;
+                    }
+                    through = through * pass;
+                }
+            }
         }
         sum
     }
 
+    /// What a layer scatters, per mm and solid angle, from straight down to a cosine `mu` up: by Henyey &
+    /// Greenstein's phase function; order 0 knows σs′ alone.
+    fn back(&self, slab: &Slab, mu: f64) -> f64 {
+        let Layer { g, sigma_s_per_mm, .. } = slab.layer;
+        if self.order == 0 {
+            return slab.sigma_s / (4.0 * PI);
+        }
+        sigma_s_per_mm * (1.0 - g * g) / (4.0 * PI * (1.0 + g * g + 2.0 * g * mu).powf(1.5))
+    }
+
     /// Fluence, as a mean and a slope in each cell, of light straight down.
-    fn normal_source(&self, source: &mut [[f64; 2]]) {
+    fn normal_source(&self, cells: &[Cell], source: &mut [[f64; 2]]) {
         let mut through = Complex::ONE;
-        for (b, cell) in source.iter_mut().zip(&self.cells) {
+        for (b, cell) in source.iter_mut().zip(cells) {
             let x = Complex::new(self.slabs[cell.slab].sigma_t * cell.thickness_mm, 0.0);
             let ray = Ray::new(x, through);
             *b = [ray.top0.re, 3.0 * ray.top1.re];
@@ -365,15 +409,15 @@ impl Solver {
     }
 
     /// The same of light from everywhere, refracted.
-    fn cosine_source(&self, s: f64, azimuths: &[f64], source: &mut [[f64; 2]]) {
-        for (u, weight) in gauss(2 * DIRECTIONS) {
+    fn cosine_source(&self, s: f64, azimuths: &[f64], cells: &[Cell], source: &mut [[f64; 2]]) {
+        for (u, weight) in gauss(2 * DIRECTIONS[0]) {
             let outside = u.sqrt();
             let mu = (1.0 - (1.0 - u) / (self.eta * self.eta)).sqrt();
             let sin_theta = (1.0 - mu * mu).sqrt();
             let share = weight * (1.0 - fresnel(mu, outside, self.eta)) / mu / azimuths.len() as f64;
             for cos_phi in azimuths {
                 let mut through = Complex::ONE;
-                for (b, cell) in source.iter_mut().zip(&self.cells) {
+                for (b, cell) in source.iter_mut().zip(cells) {
                     let sigma_t = self.slabs[cell.slab].sigma_t;
                     let x = Complex::new(sigma_t, s * sin_theta * cos_phi) * (cell.thickness_mm / mu);
                     let ray = Ray::new(x, through);
@@ -385,32 +429,29 @@ impl Solver {
         }
     }
 
-    /// Solves (I − K)x = b and sends up what x scatters.
-    fn finish<const B: usize>(
+    /// The moments of light not yet scattered, b, and of all light, x = b + Kx.
+    fn scatter<const B: usize, const P: usize>(
         &self,
         basis: [(usize, usize); B],
-        sums: &Sums<B>,
+        cells: &[Cell],
+        sums: &Sums<B, P>,
         source: &[[f64; 2]],
-        once: f64,
-    ) -> Split {
-        let n = self.cells.len();
+    ) -> [Vec<f64>; 2] {
+        let n = cells.len();
         let index = |i: usize, p: usize, b: usize| (i * 2 + p) * B + b;
-        let scatters = |i: usize, b: usize| {
-            let Cell { slab, thickness_mm } = self.cells[i];
-            self.slabs[slab].sigma_s * self.slabs[slab].moments[basis[b].0] * thickness_mm
-        };
+        let scatters = |i: usize, b: usize| self.scatters(&cells[i], basis[b]);
         let size = 2 * B * n;
         let mut k = vec![0.0; size * size];
         let receive = [1.0, 3.0];
         for i in 0..n {
             for c in 0..=i {
-                let at = sums.pair(i, c);
+                let at = cell_pair(i, c);
                 for (p, q) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
                     for b in 0..B {
                         for b2 in 0..B {
-                            let [(l, m), (l2, m2)] = [basis[b], basis[b2]];
-                            let direct = sums.direct[at][p * 2 + q][b][b2];
-                            let mirrored = sums.mirrored[at][p * 2 + q][b][b2];
+                            let [(l, _), (l2, m2)] = [basis[b], basis[b2]];
+                            let direct = sums.harmonic(&sums.direct[at][p * 2 + q], b, b2);
+                            let mirrored = sums.harmonic(&sums.mirrored[at][p * 2 + q], b, b2);
                             // From c, above, to i: straight down, or up and mirrored.
                             let down = receive[p] * (sign(q) * direct + sign(l2 + m2) * mirrored);
                             k[index(i, p, b) * size + index(c, q, b2)] += down * scatters(c, b2);
@@ -432,7 +473,7 @@ impl Solver {
                         let [(l, m), (l2, m2)] = [basis[b], basis[b2]];
                         let both = 1.0 + sign(p + q + l + l2 + m + m2);
                         k[index(c, p, b) * size + index(c, q, b2)] +=
-                            both * own[p * 2 + q][b][b2] * scatters(c, b2);
+                            both * sums.harmonic(&own[p * 2 + q], b, b2) * scatters(c, b2);
                     }
                 }
             }
@@ -450,35 +491,21 @@ impl Solver {
                 }
             }
         }
-        let emit = |x: &[f64]| {
-            let mut sum = 0.0;
-            for (c, emitted) in sums.emitted.iter().enumerate() {
-                for (q, emitted) in emitted.iter().enumerate() {
-                    for (b, emitted) in emitted.iter().enumerate() {
-                        sum += scatters(c, b) * emitted * x[index(c, q, b)];
-                    }
-                }
-            }
-            sum
-        };
-        let first = emit(&x);
+        let unscattered = x.clone();
         for (i, k) in k.iter_mut().enumerate() {
             *k = if i % (size + 1) == 0 { 1.0 - *k } else { -*k };
         }
         solve(&mut k, &mut x);
-        Split {
-            once: if self.incidence == Incidence::Normal { once } else { first },
-            more: emit(&x) - first,
-        }
+        [unscattered, x]
     }
 }
 
 /// Cells that are a part of the mean free path at each interface and grow away from it.
-fn mesh(slabs: &[Slab]) -> Vec<Cell> {
+fn mesh(slabs: &[Slab], n: f64) -> Vec<Cell> {
     let mut cells = Vec::new();
     for (slab, s) in slabs.iter().enumerate() {
         let free = 1.0 / s.sigma_t;
-        let size = |d: f64| ((free + 4.0 * d) / CELLS).min((40.0 * free).max(2.0 * d) / CELLS);
+        let size = |d: f64| ((free + 4.0 * d) / n).min((40.0 * free).max(2.0 * d) / n);
         let grow = |depth: f64| {
             let mut sizes = Vec::new();
             let mut d = 0.0;
@@ -571,57 +598,62 @@ impl Ray {
 }
 
 /// What the directions sum to, but for what does not depend on them. [2p + q] is from the cells' part q
-/// (mean, slope) to part p, [b][b′] from harmonic b′ to b.
-struct Sums<const B: usize> {
-    /// Down from cell c to cell i > c, at [`pair`](Self::pair).
-    direct: Vec<[[[f64; B]; B]; 4]>,
+/// (mean, slope) to part p, [k] between the harmonics of pair k.
+struct Sums<const B: usize, const P: usize> {
+    /// Down from cell c to cell i > c, at [`cell_pair`].
+    direct: Vec<[[f64; P]; 4]>,
     /// Up from cell c to the surface and back down to cell i ≥ c.
-    mirrored: Vec<[[[f64; B]; B]; 4]>,
+    mirrored: Vec<[[f64; P]; 4]>,
     /// Down within a cell.
-    own: Vec<[[[f64; B]; B]; 4]>,
+    own: Vec<[[f64; P]; 4]>,
     /// Out of the surface, from a cell's mean and slope.
     emitted: Vec<[[f64; B]; 2]>,
+    basis: [(usize, usize); B],
+    /// Pairs b ≤ b′: first those with m + m′ even, which take the real part of what a ray carries.
+    pairs: [(usize, usize); P],
+    real: usize,
 }
 
-impl<const B: usize> Sums<B> {
-    fn new(cells: usize) -> Self {
-        let pairs = cells * (cells + 1) / 2;
-        Self {
-            direct: vec![[[[0.0; B]; B]; 4]; pairs],
-            mirrored: vec![[[[0.0; B]; B]; 4]; pairs],
-            own: vec![[[[0.0; B]; B]; 4]; cells],
-            emitted: vec![[[0.0; B]; 2]; cells],
-        }
-    }
+fn cell_pair(i: usize, c: usize) -> usize {
+    i * (i + 1) / 2 + c
+}
 
-    fn pair(&self, i: usize, c: usize) -> usize {
-        i * (i + 1) / 2 + c
+impl<const B: usize, const P: usize> Sums<B, P> {
+    fn new(basis: [(usize, usize); B], cells: usize) -> Self {
+        let odd = |&(b, b2): &(usize, usize)| (basis[b].1 + basis[b2].1) % 2 == 1;
+        let mut list: Vec<_> = (0..B).flat_map(|b| (b..B).map(move |b2| (b, b2))).collect();
+        list.sort_by_key(odd);
+        let mut pairs = [(0, 0); P];
+        pairs.copy_from_slice(&list);
+        Self {
+            direct: vec![[[0.0; P]; 4]; cell_pair(cells, 0)],
+            mirrored: vec![[[0.0; P]; 4]; cell_pair(cells, 0)],
+            own: vec![[[0.0; P]; 4]; cells],
+            emitted: vec![[[0.0; B]; 2]; cells],
+            basis,
+            real: pairs.iter().filter(|pair| !odd(pair)).count(),
+            pairs,
+        }
     }
 
     /// Adds a direction of this share.
-    fn add(&mut self, basis: [(usize, usize); B], rays: &[Ray], y: [f64; B], share: f64, fresnel: f64) {
-        // Re(i^(m′−m)·a) as re·Re a + im·Im a.
-        let mut re = [[0.0; B]; B];
-        let mut im = [[0.0; B]; B];
-        for b in 0..B {
-            for b2 in 0..B {
-                let turns = basis[b2].1 + 4 - basis[b].1;
-                re[b][b2] = share * y[b] * y[b2] * turned(turns, Complex::ONE);
-                im[b][b2] = share * y[b] * y[b2] * turned(turns, Complex::new(0.0, 1.0));
-            }
-        }
-        let put = |to: &mut [[f64; B]; B], a: Complex| {
-            for b in 0..B {
-                for b2 in 0..B {
-                    to[b][b2] += re[b][b2] * a.re + im[b][b2] * a.im;
-                }
-            }
+    fn add(&mut self, rays: &[Ray], y: [f64; B], share: f64, fresnel: f64) {
+        // Re(i^(m′−m)·a) is Re a or Im a, but for its sign.
+        let part = |k: usize| if k < self.real { Complex::ONE } else { Complex::new(0.0, 1.0) };
+        let weights: [f64; P] = std::array::from_fn(|k| {
+            let (b, b2) = self.pairs[k];
+            share * y[b] * y[b2] * turned(self.basis[b2].1 + 4 - self.basis[b].1, part(k))
+        });
+        let (even, odd) = weights.split_at(self.real);
+        let put = |to: &mut [f64; P], a: Complex| {
+            let (reals, imaginaries) = to.split_at_mut(even.len());
+            reals.iter_mut().zip(even).for_each(|(to, w)| *to += w * a.re);
+            imaginaries.iter_mut().zip(odd).for_each(|(to, w)| *to += w * a.im);
         };
         for (i, ray) in rays.iter().enumerate() {
-            let at = self.pair(i, 0);
-            let mirrored = &mut self.mirrored[at..=at + i];
+            let at = cell_pair(i, 0);
             let top = [ray.top0 * fresnel, ray.top1 * fresnel];
-            for (to, from) in mirrored.iter_mut().zip(rays) {
+            for (to, from) in self.mirrored[at..=at + i].iter_mut().zip(rays) {
                 put(&mut to[0], top[0] * from.top0);
                 put(&mut to[1], top[0] * from.top1);
                 put(&mut to[2], top[1] * from.top0);
@@ -629,14 +661,12 @@ impl<const B: usize> Sums<B> {
             }
             // From the nearest cell above to the furthest.
             let mut near = [ray.mean, ray.slope];
-            for c in (0..i).rev() {
-                let from = &rays[c];
-                let to = &mut self.direct[at + c];
+            for (to, from) in self.direct[at..at + i].iter_mut().zip(rays).rev() {
                 put(&mut to[0], near[0] * from.mean);
                 put(&mut to[1], near[0] * from.slope);
                 put(&mut to[2], near[1] * from.mean);
                 put(&mut to[3], near[1] * from.slope);
-                near = [near[0] * from.pass, near[1] * from.pass];
+                near = near.map(|near| near * from.pass);
             }
             let own = &mut self.own[i];
             put(&mut own[0], ray.own[0]);
@@ -644,6 +674,13 @@ impl<const B: usize> Sums<B> {
             put(&mut own[2], ray.own[1] * -3.0);
             put(&mut own[3], ray.own[2]);
         }
+    }
+
+    /// From harmonic b′ to b.
+    fn harmonic(&self, sums: &[f64; P], b: usize, b2: usize) -> f64 {
+        let k = self.pairs.iter().position(|pair| *pair == (b.min(b2), b.max(b2)));
+        let swapped = if b > b2 { sign(self.basis[b].1 + self.basis[b2].1) } else { 1.0 };
+        k.map_or(0.0, |k| swapped * sums[k])
     }
 }
 

@@ -74,7 +74,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// The x ≥ 0 with Σx = 1 whose largest |Ax − b| is the least, or near it, and that residual: by
 /// least squares whose weights grow where the residual is large (Lawson's iteration).
-pub(super) fn minimax(a: &[Vec<f64>], b: &[f64]) -> (Vec<f64>, f64) {
+pub(crate) fn minimax(a: &[Vec<f64>], b: &[f64]) -> (Vec<f64>, f64) {
     const STEPS: usize = 40;
     // Σx = 1, as a row that outweighs the others.
     const SUM: f64 = 1e4;

@@ -1,0 +1,366 @@
+//! A profile of few Gaussians from what physics says: the one whose worst step edge is the least.
+//!
+//! - C. L. Lawson, *Contributions to the theory of linear least maximum approximation*, 1961: weights that
+//!   grow where the error is large.
+//! - G. H. Golub & V. Pereyra, *The differentiation of pseudo-inverses and nonlinear least squares problems
+//!   whose variables separate*, SIAM J. Numer. Anal. 10, 1973: variances by descent, weights by least squares.
+
+use super::response::step;
+use super::Response;
+use crate::plan::nnls::{minimax, nnls};
+use crate::{Error, Gaussian, Profile};
+
+/// The nearest to a line of light, in mm, that a fit looks: on skin, nobody sees less.
+const NEAREST_MM: f64 = 0.02;
+/// What E may lack of 1 where a fit ends.
+const TAIL: f64 = 2e-4;
+/// Points that are fitted, and how many times as many the error is taken at.
+const POINTS: usize = 64;
+const DENSER: usize = 4;
+
+/// A profile and what it is off by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fit {
+    /// The profile.
+    pub profile: Profile,
+    /// The worst |ΔE| at a step edge, 0.02 mm from it or more, in red, green and blue, of light that
+    /// albedo has not yet scaled.
+    pub edge_error: [f64; 3],
+    /// What no profile is better than, however many its Gaussians: their weights are not negative, but
+    /// green and blue of a spectrum may be, far from where light fell.
+    pub floor: [f64; 3],
+    /// R of red, green and blue light.
+    pub albedo: [f64; 3],
+}
+
+impl Fit {
+    /// The profile of so many Gaussians, 1 to 8, whose worst step edge is nearest to that of the responses
+    /// to red, green and blue light.
+    ///
+    /// # Errors
+    /// A number of Gaussians out of its range; a response whose albedo is not above 0.
+    pub fn new(responses: &[Response; 3], gaussians: usize) -> Result<Self, Error> {
+        if !(1..=Profile::MAX_GAUSSIANS).contains(&gaussians) {
+            let needs = format!("1 to {}", Profile::MAX_GAUSSIANS);
+            return Err(Error::new("fit: gaussians", gaussians.to_string(), needs));
+        }
+        let target = Target::new(responses)?;
+        target.fit(gaussians, target.floor())
+    }
+
+    /// The profile of as few Gaussians as come within an error on every step edge, or within a twentieth of
+    /// the floor where that is higher. Where eight do not, the eight: see [`edge_error`](Self::edge_error).
+    ///
+    /// # Errors
+    /// An error that is not above 0; a response whose albedo is not above 0.
+    pub fn within(responses: &[Response; 3], max_error: f64) -> Result<Self, Error> {
+        if max_error.is_nan() || max_error <= 0.0 {
+            let needs = "a number above 0";
+            return Err(Error::new("fit: max_error", max_error.to_string(), needs));
+        }
+        let target = Target::new(responses)?;
+        let floor = target.floor();
+        let mut best = target.fit(1, floor)?;
+        for k in 2..=Profile::MAX_GAUSSIANS {
+            let reached = |(e, floor): (&f64, &f64)| *e <= max_error.max(1.05 * floor + TAIL);
+            if best.edge_error.iter().zip(&floor).all(reached) {
+                break;
+            }
+            let next = target.fit(k, floor)?;
+            if next.worst() < best.worst() {
+                best = next;
+            }
+        }
+        Ok(best)
+    }
+
+    /// The worst of the three edge errors.
+    pub fn worst(&self) -> f64 {
+        self.edge_error.into_iter().fold(0.0, f64::max)
+    }
+
+    /// How far a profile's step edges are from those of the responses, as [`edge_error`](Self::edge_error).
+    ///
+    /// # Errors
+    /// A response whose albedo is not above 0.
+    pub fn error_of(profile: &Profile, responses: &[Response; 3]) -> Result<[f64; 3], Error> {
+        Ok(Target::new(responses)?.errors(profile))
+    }
+}
+
+/// Step edges, sampled.
+struct Target {
+    x_mm: Vec<f64>,
+    /// E by colour.
+    edges: [Vec<f64>; 3],
+    albedo: [f64; 3],
+}
+
+impl Target {
+    fn new(responses: &[Response; 3]) -> Result<Self, Error> {
+        let albedo = responses.each_ref().map(Response::albedo);
+        for (name, albedo) in ["red", "green", "blue"].into_iter().zip(albedo) {
+            if albedo.is_nan() || albedo <= 0.0 {
+                let input = format!("fit: albedo of the response to {name} light");
+                return Err(Error::new(input, albedo.to_string(), "a number above 0"));
+            }
+        }
+        let lacks = |x: f64| responses.iter().map(|r| (1.0 - r.edge(x)).abs()).fold(0.0, f64::max);
+        let has = |x: f64| responses.iter().map(|r| r.edge(x) - 0.5).fold(0.0, f64::max);
+        // Media that are as wide as a house start further out.
+        let mut first = NEAREST_MM;
+        while has(2.0 * first) < 1e-4 && first < 1e15 {
+            first *= 2.0;
+        }
+        let (mut x, mut last) = (first, first);
+        while x < 8.0 * last {
+            x *= 1.25;
+            if lacks(x) > TAIL {
+                last = x;
+            }
+        }
+        let n = POINTS * DENSER;
+        let ratio = (2.0 * last / first).powf(1.0 / (n - 1) as f64);
+        let x_mm: Vec<f64> = (0..n).map(|i| first * ratio.powi(i as i32)).collect();
+        let edges = responses.each_ref().map(|r| x_mm.iter().map(|x| r.edge(*x)).collect());
+        Ok(Self { x_mm, edges, albedo })
+    }
+
+    /// Worst errors of many Gaussians, none of them negative.
+    fn floor(&self) -> [f64; 3] {
+        const RATIO: f64 = 1.5;
+        let (first, last) = (self.x_mm[0], self.x_mm[self.x_mm.len() - 1]);
+        let n = ((4.0 * last / first).ln() / RATIO.ln()).ceil().min(40.0) as i32;
+        let sigma = |i: i32| 0.25 * first * RATIO.powi(i);
+        let row = |x: f64| (0..=n).map(|i| step(x, sigma(i) * sigma(i))).collect::<Vec<_>>();
+        let at = |v: &[f64]| v.iter().copied().step_by(DENSER).collect::<Vec<_>>();
+        let rows: Vec<_> = at(&self.x_mm).into_iter().map(row).collect();
+        self.edges.each_ref().map(|e| minimax(&rows, &at(e)).1)
+    }
+
+    fn errors(&self, profile: &Profile) -> [f64; 3] {
+        let mut worst = [0.0f64; 3];
+        for (i, x) in self.x_mm.iter().enumerate() {
+            let mut edge = [0.0; 3];
+            for g in profile.gaussians() {
+                let step = step(*x, f64::from(g.variance_mm2));
+                for (c, edge) in edge.iter_mut().enumerate() {
+                    *edge += f64::from(g.weight[c]) * step;
+                }
+            }
+            for c in 0..3 {
+                worst[c] = worst[c].max((edge[c] - self.edges[c][i]).abs());
+            }
+        }
+        worst
+    }
+
+    fn fit(&self, gaussians: usize, floor: [f64; 3]) -> Result<Fit, Error> {
+        let last = self.x_mm[self.x_mm.len() - 1];
+        let search = Search::new(self);
+        let mut best: Option<Fit> = None;
+        for narrowest in [1.0, 2.5] {
+            let (low, high) = (narrowest * self.x_mm[0], last / 5.0);
+            let share = |j: usize| if gaussians == 1 { 0.7 } else { j as f64 / (gaussians - 1) as f64 };
+            let sigma = |j: usize| low * (high.max(low) / low).powf(share(j));
+            let start: Vec<f64> = (0..gaussians).map(|j| 2.0 * sigma(j).ln()).collect();
+            search.minimax(start, |point| {
+                let profile = Profile::new(&point.gaussians())?;
+                let edge_error = self.errors(&profile);
+                let fit = Fit {
+                    profile,
+                    edge_error,
+                    floor,
+                    albedo: self.albedo,
+                };
+                if best.is_none_or(|best| fit.worst() < best.worst()) {
+                    best = Some(fit);
+                }
+                Ok(())
+            })?;
+        }
+        best.ok_or_else(|| Error::new("fit", "no profile", "step edges that are numbers"))
+    }
+}
+
+/// Variances and the best weights for them.
+#[derive(Clone)]
+struct Point {
+    log_variances: Vec<f64>,
+    weights: [Vec<f64>; 3],
+    /// Σu·ΔE² and its slope.
+    value: f64,
+    slope: Vec<f64>,
+    /// ΔE by colour.
+    residuals: [Vec<f64>; 3],
+}
+
+impl Point {
+    fn gaussians(&self) -> Vec<Gaussian> {
+        let weight = |c: usize, j: usize| self.weights[c][j] as f32;
+        let gaussian = |(j, log): (usize, &f64)| Gaussian {
+            variance_mm2: log.exp().min(f64::from(f32::MAX)) as f32,
+            weight: [weight(0, j), weight(1, j), weight(2, j)].into(),
+        };
+        self.log_variances.iter().enumerate().map(gaussian).collect()
+    }
+}
+
+/// The search for variances.
+struct Search {
+    x_mm: Vec<f64>,
+    edges: [Vec<f64>; 3],
+}
+
+impl Search {
+    fn new(target: &Target) -> Self {
+        let at = |v: &[f64]| v.iter().copied().step_by(DENSER).collect::<Vec<_>>();
+        Self {
+            x_mm: at(&target.x_mm),
+            edges: target.edges.each_ref().map(|e| at(e)),
+        }
+    }
+
+    /// Least squares, then least squares with weights that grow where the error is large; `seen` is shown
+    /// each step.
+    fn minimax(
+        &self,
+        start: Vec<f64>,
+        mut seen: impl FnMut(&Point) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        let mut u = [(); 3].map(|()| vec![1.0 / POINTS as f64; POINTS]);
+        let mut point = self.descend(start, &u, 60);
+        seen(&point)?;
+        for _ in 0..16 {
+            let worst = point.residuals.iter().flatten().fold(0.0f64, |m, r| m.max(r.abs()));
+            let mut sum = 0.0;
+            for (u, r) in u.iter_mut().flatten().zip(point.residuals.iter().flatten()) {
+                *u *= r.abs() + 0.02 * worst;
+                sum += *u;
+            }
+            if sum == 0.0 {
+                break;
+            }
+            u.iter_mut().flatten().for_each(|u| *u *= 3.0 / sum);
+            point = self.descend(point.log_variances, &u, 12);
+            seen(&point)?;
+        }
+        Ok(())
+    }
+
+    /// BFGS.
+    fn descend(&self, start: Vec<f64>, u: &[Vec<f64>; 3], steps: usize) -> Point {
+        let k = start.len();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut point = self.at(start, u);
+        let mut inverse: Option<Vec<Vec<f64>>> = None;
+        for _ in 0..steps {
+            let mut way: Vec<f64> = match &inverse {
+                Some(h) => h.iter().map(|row| -dot(row, &point.slope)).collect(),
+                None => point.slope.iter().map(|s| -s).collect(),
+            };
+            // No step widens a Gaussian by more than half.
+            let longest = way.iter().fold(0.0f64, |m, w| m.max(w.abs()));
+            if longest == 0.0 || !longest.is_finite() {
+                break;
+            }
+            let scale = if inverse.is_none() { 0.3 / longest } else { (0.8 / longest).min(1.0) };
+            way.iter_mut().for_each(|w| *w *= scale);
+            let falls = dot(&way, &point.slope);
+            let mut share = 1.0;
+            let next = loop {
+                let moved = point.log_variances.iter().zip(&way).map(|(v, w)| v + share * w);
+                let next = self.at(moved.collect(), u);
+                if next.value <= point.value + 1e-4 * share * falls {
+                    break Some(next);
+                }
+                share *= 0.3;
+                if share < 1e-4 {
+                    break None;
+                }
+            };
+            let Some(next) = next else {
+                if inverse.is_none() {
+                    break;
+                }
+                inverse = None;
+                continue;
+            };
+            let s: Vec<f64> = way.iter().map(|w| share * w).collect();
+            let y: Vec<f64> = next.slope.iter().zip(&point.slope).map(|(a, b)| a - b).collect();
+            let sy = dot(&s, &y);
+            if sy > 0.0 {
+                let h = inverse.get_or_insert_with(|| {
+                    let size = sy / dot(&y, &y);
+                    let row = |i| (0..k).map(|j| if i == j { size } else { 0.0 }).collect();
+                    (0..k).map(row).collect()
+                });
+                let hy: Vec<f64> = h.iter().map(|row| dot(row, &y)).collect();
+                let grows = (1.0 + dot(&y, &hy) / sy) / sy;
+                for i in 0..k {
+                    for j in 0..k {
+                        h[i][j] += grows * s[i] * s[j] - (hy[i] * s[j] + s[i] * hy[j]) / sy;
+                    }
+                }
+            }
+            let gained = point.value - next.value;
+            point = next;
+            if gained < 1e-7 * point.value {
+                break;
+            }
+        }
+        point
+    }
+
+    /// The best weights for these variances, and how the error changes with them: the weights being the
+    /// best, as if they stayed.
+    fn at(&self, log_variances: Vec<f64>, u: &[Vec<f64>; 3]) -> Point {
+        // Σw = 1, as a row that outweighs the others.
+        const SUM: f64 = 1e4;
+        let k = log_variances.len();
+        let mut steps = Vec::with_capacity(POINTS * k);
+        let mut slopes = Vec::with_capacity(POINTS * k);
+        for x in &self.x_mm {
+            for log in &log_variances {
+                let t = x * (-0.5 * log).exp();
+                steps.push(step(t, 1.0));
+                // d/d(ln v) of Φ(x/√v).
+                slopes.push(-0.5 * t * (-0.5 * t * t).exp() / (2.0 * std::f64::consts::PI).sqrt());
+            }
+        }
+        let mut point = Point {
+            log_variances,
+            weights: Default::default(),
+            value: 0.0,
+            slope: vec![0.0; k],
+            residuals: Default::default(),
+        };
+        for c in 0..3 {
+            let mut gram = vec![vec![SUM; k]; k];
+            let mut rhs = vec![SUM; k];
+            for ((row, e), u) in steps.chunks(k).zip(&self.edges[c]).zip(&u[c]) {
+                for i in 0..k {
+                    rhs[i] += u * row[i] * e;
+                    for j in 0..k {
+                        gram[i][j] += u * row[i] * row[j];
+                    }
+                }
+            }
+            let mut w = nnls(&gram, &rhs);
+            let sum: f64 = w.iter().sum();
+            w.iter_mut().for_each(|w| *w /= sum);
+            for (i, e) in self.edges[c].iter().enumerate() {
+                let row = i * k..(i + 1) * k;
+                let fitted: f64 = steps[row.clone()].iter().zip(&w).map(|(s, w)| s * w).sum();
+                let residual = fitted - e;
+                point.value += u[c][i] * residual * residual;
+                for (slope, (s, w)) in point.slope.iter_mut().zip(slopes[row].iter().zip(&w)) {
+                    *slope += 2.0 * u[c][i] * residual * s * w;
+                }
+                point.residuals[c].push(residual);
+            }
+            point.weights[c] = w;
+        }
+        point
+    }
+}
