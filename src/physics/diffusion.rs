@@ -37,11 +37,9 @@ impl Diffusion {
         };
         let free = 1.0 / layer.sigma_t_reduced();
         let boundary = Boundary::new(medium.eta());
+        let once = Once::new(layer, medium.eta());
         let ms = |r: f64| self.multiple(layer, &boundary, r);
-        let ss = |r: f64| match self {
-            Self::Dipole => 0.0,
-            _ => single_scattering(layer, medium.eta(), r),
-        };
+        let ss = |r: f64| if self == Self::Dipole { 0.0 } else { once.radial(r) };
         let reach = (20.0 * free).max(40.0 / layer.sigma_tr()).min(1e5 * free);
         Ok(Response::sample(1e-4 * free, reach, |r| ms(r) + ss(r)))
     }
@@ -74,17 +72,23 @@ impl Diffusion {
         if self == Self::BetterDipole {
             return alpha * alpha * dipole(1.0 / sigma_t).0;
         }
-        // As many depths as pbrt takes, each of the same share of the beam.
-        const DEPTHS: usize = 100;
-        let at = |i: usize| {
-            let z = -(1.0 - (i as f64 + 0.5) / DEPTHS as f64).ln() / sigma_t;
+        // Over the share of the beam that is above z, closest where r is small.
+        let at = |(t, weight): (f64, f64)| {
+            let above = t * t * (3.0 - 2.0 * t);
+            let z = -(-above).ln_1p() / sigma_t;
             let (light, near) = dipole(z);
             // Habel et al.'s correction near the beam.
             let kappa = 1.0 - (-2.0 * sigma_t * (near + z)).exp();
-            kappa * light
+            6.0 * t * (1.0 - t) * weight * kappa * light
         };
-        alpha * alpha * (0..DEPTHS).map(at).sum::<f64>() / DEPTHS as f64
+        alpha * alpha * boundary.depths.iter().copied().map(at).sum::<f64>()
     }
+}
+
+/// What leaves of light that entered, by the dipole of Jensen et al. (their Eq. 15), for an albedo α′.
+pub(super) fn dipole_albedo(alpha: f64, eta: f64) -> f64 {
+    let q = (3.0 * (1.0 - alpha)).sqrt();
+    0.5 * alpha * (1.0 + (-4.0 / 3.0 * Boundary::new(eta).a_classical * q).exp()) * (-q).exp()
 }
 
 /// Flux through the surface by a source at depth z: z(1 + kd)e^−kd/(4πd³).
@@ -101,6 +105,8 @@ struct Boundary {
     a: f64,
     c_phi: f64,
     c_e: f64,
+    /// Where along a beam its sources are, and what they weigh.
+    depths: Vec<(f64, f64)>,
 }
 
 impl Boundary {
@@ -120,6 +126,7 @@ impl Boundary {
             a: (1.0 + 3.0 * c2) / (1.0 - 2.0 * c1),
             c_phi: 0.25 * (1.0 - 2.0 * c1),
             c_e: 0.5 * (1.0 - 3.0 * c2),
+            depths: gauss(64),
         }
     }
 }
@@ -127,22 +134,30 @@ impl Boundary {
 /// R(r) in 1/mm² of light that was scattered once, without approximation: Habel et al. 2013, over the angle
 /// ψ under which a point of the beam is seen from the surface, t = r·tan ψ.
 pub fn single_scattering(layer: &Layer, eta: f64, r_mm: f64) -> f64 {
-    let Layer {
-        sigma_a_per_mm,
-        sigma_s_per_mm: sigma_s,
-        g,
-        ..
-    } = *layer;
-    let sigma_t = sigma_a_per_mm + sigma_s;
-    let critical = (1.0 - 1.0 / (eta * eta)).sqrt().asin();
-    let range = FRAC_PI_2 - critical;
-    let at = |(t, weight): (f64, f64)| {
-        let psi = critical + range * t * t * (3.0 - 2.0 * t);
-        let (mu, cos) = psi.sin_cos();
-        let phase = (1.0 - g * g) / (4.0 * PI * (1.0 + g * g + 2.0 * g * mu).powf(1.5));
-        let fade = (-sigma_t * r_mm * (mu + 1.0) / cos).exp();
-        let leaves = 1.0 - fresnel_inside(mu, eta);
-        range * 6.0 * t * (1.0 - t) * weight * sigma_s * fade * phase * leaves * mu
-    };
-    gauss(48).into_iter().map(at).sum::<f64>() / r_mm
+    Once::new(layer, eta).radial(r_mm)
+}
+
+/// Single scattering by angle: what fades as e^−ar, and a.
+struct Once(Vec<(f64, f64)>);
+
+impl Once {
+    fn new(layer: &Layer, eta: f64) -> Self {
+        let Layer { g, .. } = *layer;
+        let sigma_t = layer.sigma_a_per_mm + layer.sigma_s_per_mm;
+        let critical = (1.0 - 1.0 / (eta * eta)).sqrt().asin();
+        let range = FRAC_PI_2 - critical;
+        let at = |(t, weight): (f64, f64)| {
+            let psi = critical + range * t * t * (3.0 - 2.0 * t);
+            let (mu, cos) = psi.sin_cos();
+            let phase = (1.0 - g * g) / (4.0 * PI * (1.0 + g * g + 2.0 * g * mu).powf(1.5));
+            let leaves = phase * (1.0 - fresnel_inside(mu, eta)) * mu;
+            let share = range * 6.0 * t * (1.0 - t) * weight;
+            (share * layer.sigma_s_per_mm * leaves, sigma_t * (mu + 1.0) / cos)
+        };
+        Self(gauss(64).into_iter().map(at).collect())
+    }
+
+    fn radial(&self, r_mm: f64) -> f64 {
+        self.0.iter().map(|(light, fade)| light * (-fade * r_mm).exp()).sum::<f64>() / r_mm
+    }
 }

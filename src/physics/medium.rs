@@ -1,6 +1,11 @@
 //! What light meets under a surface: layers that absorb and scatter, under one Fresnel boundary.
 
+use std::ops::RangeInclusive;
+
 use crate::Error;
+
+/// Scattering that is more backward than this is more than [`Transport`](super::Transport) resolves.
+pub(super) const G_RANGE: RangeInclusive<f64> = -0.5..=0.99;
 
 /// A layer, as one colour or one wavelength sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,8 +16,8 @@ pub struct Layer {
     pub sigma_a_per_mm: f64,
     /// Scattering σs in 1/mm, at least 0: that of single events, (1 − g) of which is σs′.
     pub sigma_s_per_mm: f64,
-    /// The mean cosine g of a scattering event (Henyey–Greenstein): 0 scatters all ways alike, skin
-    /// about 0.8. At most 0.99 either way.
+    /// The mean cosine g of a scattering event (Henyey–Greenstein), −0.5 to 0.99: 0 scatters all ways
+    /// alike, skin about 0.8.
     pub g: f64,
 }
 
@@ -92,13 +97,16 @@ impl Medium {
                 Err(Error::new(format!("medium: {field} of layer {i}"), got.to_string(), needs))
             };
             // What sums and squares of these stay far within a float.
-            const RANGE: std::ops::RangeInclusive<f64> = 0.0..=1e12;
+            const RANGE: RangeInclusive<f64> = 0.0..=1e12;
             let Layer {
                 thickness_mm,
                 sigma_a_per_mm,
                 sigma_s_per_mm,
                 g,
             } = *layer;
+            if !G_RANGE.contains(&g) {
+                return refuse("g", g, "-0.5 to 0.99");
+            }
             if i == last && thickness_mm != f64::INFINITY {
                 return refuse("thickness_mm", thickness_mm, "infinity, since it is the last");
             }
@@ -112,9 +120,6 @@ impl Medium {
                 if !RANGE.contains(&sigma) {
                     return refuse(field, sigma, "a number, 0 to 1e12");
                 }
-            }
-            if !(-0.99..=0.99).contains(&g) {
-                return refuse("g", g, "-0.99 to 0.99");
             }
             if i == last && sigma_a_per_mm < LEAST_LOSS * layer.sigma_s_reduced() {
                 return refuse(

@@ -1,9 +1,12 @@
 //! Profiles from what skin and other materials are made of.
 
+pub mod artist;
 mod complex;
 mod diffusion;
 mod fit;
 mod medium;
+mod pigments;
+pub mod presets;
 mod quadrature;
 mod response;
 mod transport;
@@ -11,6 +14,7 @@ mod transport;
 pub use diffusion::{Diffusion, single_scattering};
 pub use fit::Fit;
 pub use medium::{Layer, Medium};
+pub use pigments::Skin;
 pub use quadrature::fresnel_inside;
 pub use response::Response;
 pub use transport::{Incidence, Transport};

@@ -91,6 +91,15 @@ impl Transport {
         Ok(gaussians(&samples, albedo))
     }
 
+    /// The same of a medium each for red, green and blue light.
+    ///
+    /// # Errors
+    /// As [`response`](Self::response).
+    pub fn responses(&self, media: &[Medium; 3]) -> Result<[Response; 3], Error> {
+        let [r, g, b] = media.each_ref().map(|medium| self.response(medium));
+        Ok([r?, g?, b?])
+    }
+
     /// R̂(s) = 2π∫R(r)·J₀(sr)·r dr at a frequency in rad/mm; the albedo at 0.
     ///
     /// # Errors

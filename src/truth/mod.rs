@@ -11,11 +11,15 @@
 
 pub mod closed_form;
 mod cloud;
+#[cfg(feature = "physics")]
+mod random_walk;
 mod surface;
 mod tree;
 mod visible;
 
 pub use cloud::Patch;
+#[cfg(feature = "physics")]
+pub use random_walk::{Walk, random_walk};
 pub use surface::{Place, SurfaceIntegral, Triangles, surface_integral};
 pub use visible::{Pixel, visible_integral};
 
