@@ -5,7 +5,8 @@
 //! an atlas of a mesh, the way of the paper; it is the reference that the screen is compared with.
 //! Both blur by a [`Profile`], a sum of Gaussians with variances in mm².
 //!
-//! Features: `json` reads profiles from files; `renderer` is a small deferred renderer that plays
+//! Features: `json` reads profiles from files; `physics` makes them from layers, pigments and scattering
+//! coefficients; `renderer` is a small deferred renderer that plays
 //! the host in the examples and tests; `truth` sums the integrals that all is measured against.
 
 mod error;

@@ -59,7 +59,10 @@ impl Sub for Complex {
 impl Mul for Complex {
     type Output = Self;
     fn mul(self, b: Self) -> Self {
-        Self::new(self.re * b.re - self.im * b.im, self.re * b.im + self.im * b.re)
+        Self::new(
+            self.re * b.re - self.im * b.im,
+            self.re * b.im + self.im * b.re,
+        )
     }
 }
 

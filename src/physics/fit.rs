@@ -5,8 +5,8 @@
 //! - G. H. Golub & V. Pereyra, *The differentiation of pseudo-inverses and nonlinear least squares problems
 //!   whose variables separate*, SIAM J. Numer. Anal. 10, 1973: variances by descent, weights by least squares.
 
-use super::response::step;
 use super::Response;
+use super::response::step;
 use crate::plan::nnls::{minimax, nnls};
 use crate::{Error, Gaussian, Profile};
 
@@ -105,8 +105,18 @@ impl Target {
                 return Err(Error::new(input, albedo.to_string(), "a number above 0"));
             }
         }
-        let lacks = |x: f64| responses.iter().map(|r| (1.0 - r.edge(x)).abs()).fold(0.0, f64::max);
-        let has = |x: f64| responses.iter().map(|r| r.edge(x) - 0.5).fold(0.0, f64::max);
+        let lacks = |x: f64| {
+            responses
+                .iter()
+                .map(|r| (1.0 - r.edge(x)).abs())
+                .fold(0.0, f64::max)
+        };
+        let has = |x: f64| {
+            responses
+                .iter()
+                .map(|r| r.edge(x) - 0.5)
+                .fold(0.0, f64::max)
+        };
         // Media that are as wide as a house start further out.
         let mut first = NEAREST_MM;
         while has(2.0 * first) < 1e-4 && first < 1e15 {
@@ -122,8 +132,14 @@ impl Target {
         let n = POINTS * DENSER;
         let ratio = (2.0 * last / first).powf(1.0 / (n - 1) as f64);
         let x_mm: Vec<f64> = (0..n).map(|i| first * ratio.powi(i as i32)).collect();
-        let edges = responses.each_ref().map(|r| x_mm.iter().map(|x| r.edge(*x)).collect());
-        Ok(Self { x_mm, edges, albedo })
+        let edges = responses
+            .each_ref()
+            .map(|r| x_mm.iter().map(|x| r.edge(*x)).collect());
+        Ok(Self {
+            x_mm,
+            edges,
+            albedo,
+        })
     }
 
     /// Worst errors of many Gaussians, none of them negative.
@@ -132,7 +148,11 @@ impl Target {
         let (first, last) = (self.x_mm[0], self.x_mm[self.x_mm.len() - 1]);
         let n = ((4.0 * last / first).ln() / RATIO.ln()).ceil().min(40.0) as i32;
         let sigma = |i: i32| 0.25 * first * RATIO.powi(i);
-        let row = |x: f64| (0..=n).map(|i| step(x, sigma(i) * sigma(i))).collect::<Vec<_>>();
+        let row = |x: f64| {
+            (0..=n)
+                .map(|i| step(x, sigma(i) * sigma(i)))
+                .collect::<Vec<_>>()
+        };
         let at = |v: &[f64]| v.iter().copied().step_by(DENSER).collect::<Vec<_>>();
         let rows: Vec<_> = at(&self.x_mm).into_iter().map(row).collect();
         self.edges.each_ref().map(|e| minimax(&rows, &at(e)).1)
@@ -161,7 +181,13 @@ impl Target {
         let mut best: Option<Fit> = None;
         for narrowest in [1.0, 2.5] {
             let (low, high) = (narrowest * self.x_mm[0], last / 5.0);
-            let share = |j: usize| if gaussians == 1 { 0.7 } else { j as f64 / (gaussians - 1) as f64 };
+            let share = |j: usize| {
+                if gaussians == 1 {
+                    0.7
+                } else {
+                    j as f64 / (gaussians - 1) as f64
+                }
+            };
             let sigma = |j: usize| low * (high.max(low) / low).powf(share(j));
             let start: Vec<f64> = (0..gaussians).map(|j| 2.0 * sigma(j).ln()).collect();
             search.minimax(start, |point| {
@@ -202,7 +228,11 @@ impl Point {
             variance_mm2: log.exp().min(f64::from(f32::MAX)) as f32,
             weight: [weight(0, j), weight(1, j), weight(2, j)].into(),
         };
-        self.log_variances.iter().enumerate().map(gaussian).collect()
+        self.log_variances
+            .iter()
+            .enumerate()
+            .map(gaussian)
+            .collect()
     }
 }
 
@@ -232,7 +262,11 @@ impl Search {
         let mut point = self.descend(start, &u, 60);
         seen(&point)?;
         for _ in 0..16 {
-            let worst = point.residuals.iter().flatten().fold(0.0f64, |m, r| m.max(r.abs()));
+            let worst = point
+                .residuals
+                .iter()
+                .flatten()
+                .fold(0.0f64, |m, r| m.max(r.abs()));
             let mut sum = 0.0;
             for (u, r) in u.iter_mut().flatten().zip(point.residuals.iter().flatten()) {
                 *u *= r.abs() + 0.02 * worst;
@@ -264,12 +298,20 @@ impl Search {
             if longest == 0.0 || !longest.is_finite() {
                 break;
             }
-            let scale = if inverse.is_none() { 0.3 / longest } else { (0.8 / longest).min(1.0) };
+            let scale = if inverse.is_none() {
+                0.3 / longest
+            } else {
+                (0.8 / longest).min(1.0)
+            };
             way.iter_mut().for_each(|w| *w *= scale);
             let falls = dot(&way, &point.slope);
             let mut share = 1.0;
             let next = loop {
-                let moved = point.log_variances.iter().zip(&way).map(|(v, w)| v + share * w);
+                let moved = point
+                    .log_variances
+                    .iter()
+                    .zip(&way)
+                    .map(|(v, w)| v + share * w);
                 let next = self.at(moved.collect(), u);
                 if next.value <= point.value + 1e-4 * share * falls {
                     break Some(next);
@@ -287,7 +329,12 @@ impl Search {
                 continue;
             };
             let s: Vec<f64> = way.iter().map(|w| share * w).collect();
-            let y: Vec<f64> = next.slope.iter().zip(&point.slope).map(|(a, b)| a - b).collect();
+            let y: Vec<f64> = next
+                .slope
+                .iter()
+                .zip(&point.slope)
+                .map(|(a, b)| a - b)
+                .collect();
             let sy = dot(&s, &y);
             if sy > 0.0 {
                 let h = inverse.get_or_insert_with(|| {

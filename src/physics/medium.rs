@@ -34,7 +34,10 @@ impl Layer {
 
     /// The same layer, this thick.
     pub const fn thick(self, thickness_mm: f64) -> Self {
-        Self { thickness_mm, ..self }
+        Self {
+            thickness_mm,
+            ..self
+        }
     }
 
     /// The same absorption and σs′ by scattering of this mean cosine.
@@ -79,7 +82,10 @@ pub struct Medium {
 const LEAST_LOSS: f64 = 1e-6;
 
 impl Medium {
-    /// Layers from the surface down, and the index of refraction of them all against air, 1 to 3. Layers
+    /// The most layers: the time to solve them grows with the cube of their number.
+    pub const MAX_LAYERS: usize = 8;
+
+    /// One to eight layers from the surface down, and the index of refraction of them all against air, 1 to 3. Layers
     /// of no thickness are left out.
     ///
     /// # Errors
@@ -89,12 +95,22 @@ impl Medium {
         if !(1.0..=3.0).contains(&eta) {
             return Err(Error::new("medium: eta", eta.to_string(), "1 to 3"));
         }
-        let Some(last) = layers.len().checked_sub(1) else {
-            return Err(Error::new("medium: layers", "none", "at least one"));
-        };
+        if !(1..=Self::MAX_LAYERS).contains(&layers.len()) {
+            let needs = format!("1 to {}", Self::MAX_LAYERS);
+            return Err(Error::new(
+                "medium: layers",
+                layers.len().to_string(),
+                needs,
+            ));
+        }
+        let last = layers.len() - 1;
         for (i, layer) in layers.iter().enumerate() {
             let refuse = |field: &str, got: f64, needs: &str| {
-                Err(Error::new(format!("medium: {field} of layer {i}"), got.to_string(), needs))
+                Err(Error::new(
+                    format!("medium: {field} of layer {i}"),
+                    got.to_string(),
+                    needs,
+                ))
             };
             // What sums and squares of these stay far within a float.
             const RANGE: RangeInclusive<f64> = 0.0..=1e12;
@@ -108,7 +124,11 @@ impl Medium {
                 return refuse("g", g, "-0.5 to 0.99");
             }
             if i == last && thickness_mm != f64::INFINITY {
-                return refuse("thickness_mm", thickness_mm, "infinity, since it is the last");
+                return refuse(
+                    "thickness_mm",
+                    thickness_mm,
+                    "infinity, since it is the last",
+                );
             }
             if i != last && !RANGE.contains(&thickness_mm) {
                 return refuse("thickness_mm", thickness_mm, "a number of mm, 0 to 1e12");
@@ -129,7 +149,11 @@ impl Medium {
                 );
             }
         }
-        let layers: Vec<_> = layers.iter().copied().filter(|l| l.thickness_mm > 0.0).collect();
+        let layers: Vec<_> = layers
+            .iter()
+            .copied()
+            .filter(|l| l.thickness_mm > 0.0)
+            .collect();
         if layers.iter().all(|l| l.sigma_s_per_mm == 0.0) {
             return Err(Error::new(
                 "medium: sigma_s_per_mm",

@@ -92,21 +92,36 @@ impl Skin {
             ("epidermis_mm", self.epidermis_mm),
         ] {
             if !(0.0..=1.0).contains(&value) {
-                return Err(Error::new(format!("skin: {name}"), value.to_string(), "0 to 1"));
+                return Err(Error::new(
+                    format!("skin: {name}"),
+                    value.to_string(),
+                    "0 to 1",
+                ));
             }
         }
         if !G_RANGE.contains(&self.g) {
             return Err(Error::new("skin: g", self.g.to_string(), "-0.5 to 0.99"));
         }
-        SPECTRUM.iter().map(|w| Ok((w.0, self.medium(w)?))).collect()
+        SPECTRUM
+            .iter()
+            .map(|w| Ok((w.0, self.medium(w)?)))
+            .collect()
     }
 
-    fn medium(&self, &Wavelength(nm, oxygenated, deoxygenated, _): &Wavelength) -> Result<Medium, Error> {
+    fn medium(
+        &self,
+        &Wavelength(nm, oxygenated, deoxygenated, _): &Wavelength,
+    ) -> Result<Medium, Error> {
         let mix = |share: f64, a: f64, b: f64| share * a + (1.0 - share) * b;
         let bare = 0.0244 + 8.53 * (-(nm - 154.0) / 66.2).exp();
-        let melanin = mix(self.eumelanin, 6.6e10 * nm.powf(-3.33), 2.9e14 * nm.powf(-4.75));
+        let melanin = mix(
+            self.eumelanin,
+            6.6e10 * nm.powf(-3.33),
+            2.9e14 * nm.powf(-4.75),
+        );
         // 150 g of haemoglobin, of 64 500 g a mole, to a litre; per mm, and e instead of ten.
-        let blood = mix(self.oxygenation, oxygenated, deoxygenated) * 2.303 * 150.0 / 64500.0 / 10.0;
+        let blood =
+            mix(self.oxygenation, oxygenated, deoxygenated) * 2.303 * 150.0 / 64500.0 / 10.0;
         let scattering = 14.74 * nm.powf(-0.22) + 2.2e11 * nm.powi(-4);
         let epidermis = Layer::isotropic(mix(self.melanin, melanin, bare), scattering);
         let dermis = Layer::isotropic(mix(self.haemoglobin, blood, bare), 0.5 * scattering);

@@ -5,9 +5,14 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// A part of the light, spread one way.
 #[derive(Clone, Copy, Debug)]
 enum Term {
-    Gaussian { variance_mm2: f64 },
+    Gaussian {
+        variance_mm2: f64,
+    },
     /// As much on each mm² between two radii.
-    Ring { inner_mm: f64, outer_mm: f64 },
+    Ring {
+        inner_mm: f64,
+        outer_mm: f64,
+    },
 }
 
 /// A radially symmetric R(r), the flux that leaves per mm² and unit of power that entered, as a sum of
@@ -55,7 +60,9 @@ impl Response {
     /// The sum of responses, each times its weight, which may be negative: colours from a spectrum.
     pub fn sum<'a>(parts: impl IntoIterator<Item = (f64, &'a Self)>) -> Self {
         let scaled = |(weight, part): (f64, &'a Self)| {
-            part.terms.iter().map(move |&(energy, term)| (weight * energy, term))
+            part.terms
+                .iter()
+                .map(move |&(energy, term)| (weight * energy, term))
         };
         Self {
             terms: parts.into_iter().flat_map(scaled).collect(),

@@ -67,26 +67,28 @@ impl Transport {
     /// What leaves a medium around the point where light entered.
     ///
     /// # Errors
-    /// An order above 2; cosine incidence where scattering is anisotropic and the order above 0.
+    /// An order above 2; cosine incidence where scattering is anisotropic and the order above 0; a medium
+    /// that sends no light back that a float could tell.
     pub fn response(&self, medium: &Medium) -> Result<Response, Error> {
         let solver = Solver::new(self, medium)?;
+        let zero = solver.solve(0.0);
+        let albedo = zero.sum();
+        if albedo.is_nan() || albedo <= 0.0 {
+            let needs = "layers that send light back";
+            return Err(Error::new(
+                "medium",
+                format!("an albedo of {albedo}"),
+                needs,
+            ));
+        }
         let (low, high) = solver.frequencies();
         let steps = ((high / low).log10() * FREQUENCIES).ceil() as usize;
         let ratio = (high / low).powf(1.0 / steps as f64);
-        let zero = solver.solve(0.0);
         let mut samples: Vec<(f64, Split)> = (0..=steps)
             .map(|i| low * ratio.powi(i as i32))
             .map(|s| (s, solver.solve(s)))
             .collect();
         extend(&mut samples);
-        let albedo = zero.sum();
-        if albedo <= 0.0 || !albedo.is_finite() {
-            return Err(Error::new(
-                "medium",
-                format!("an albedo of {albedo}"),
-                "layers that send some light back",
-            ));
-        }
         let samples: Vec<_> = [(0.0, zero)].into_iter().chain(samples).collect();
         Ok(gaussians(&samples, albedo))
     }
@@ -107,7 +109,11 @@ impl Transport {
     pub fn transform(&self, medium: &Medium, s_per_mm: f64) -> Result<f64, Error> {
         if !(0.0..=1e15).contains(&s_per_mm) {
             let needs = "a number of rad/mm, 0 to 1e15";
-            return Err(Error::new("transport: s_per_mm", s_per_mm.to_string(), needs));
+            return Err(Error::new(
+                "transport: s_per_mm",
+                s_per_mm.to_string(),
+                needs,
+            ));
         }
         Ok(Solver::new(self, medium)?.solve(s_per_mm).sum())
     }
@@ -134,11 +140,19 @@ fn extend(samples: &mut Vec<(f64, Split)>) {
     let b = (before.once * s0 - last.once * s1) / (1.0 / s0 - 1.0 / s1);
     let a = last.once * s1 - b / s1;
     let ends = last.more > 0.0 && before.more > last.more;
-    let power = if ends { (before.more / last.more).ln() / (s0 / s1).ln() } else { 0.0 };
+    let power = if ends {
+        (before.more / last.more).ln() / (s0 / s1).ln()
+    } else {
+        0.0
+    };
     for octave in 1..=6 {
         let s = s1 * f64::from(1 << octave);
         let once = (a / s + b / (s * s)).max(0.0);
-        let more = if ends { last.more * (s / s1).powf(power) } else { 0.0 };
+        let more = if ends {
+            last.more * (s / s1).powf(power)
+        } else {
+            0.0
+        };
         samples.push((s, Split { once, more }));
     }
 }
@@ -149,7 +163,9 @@ fn gaussians(samples: &[(f64, Split)], albedo: f64) -> Response {
     let (low, high) = (samples[1].0, samples[samples.len() - 1].0);
     let (least, most) = (0.5 / high, 4.0 / low);
     let terms = ((most / least).ln() / RATIO.ln()).ceil() as i32;
-    let variances: Vec<f64> = (0..=terms).map(|i| (least * RATIO.powi(i)).powi(2)).collect();
+    let variances: Vec<f64> = (0..=terms)
+        .map(|i| (least * RATIO.powi(i)).powi(2))
+        .collect();
     let rows: Vec<Vec<f64>> = samples
         .iter()
         .map(|(s, _)| variances.iter().map(|v| (-0.5 * v * s * s).exp()).collect())
@@ -191,7 +207,13 @@ impl Slab {
     fn new(layer: &Layer, order: usize) -> Self {
         let peak = layer.g.powi(order as i32 + 1);
         let sigma_s = layer.sigma_s_per_mm * (1.0 - peak);
-        let moment = |l: i32| if l as usize > order { 0.0 } else { (layer.g.powi(l) - peak) / (1.0 - peak) };
+        let moment = |l: i32| {
+            if l as usize > order {
+                0.0
+            } else {
+                (layer.g.powi(l) - peak) / (1.0 - peak)
+            }
+        };
         Self {
             sigma_t: layer.sigma_a_per_mm + sigma_s,
             sigma_s,
@@ -208,7 +230,6 @@ impl Slab {
         let diffuse = 10.0 / self.layer.sigma_tr();
         (14.0 * free).max(diffuse.min(2e4 * free))
     }
-
 }
 
 struct Cell {
@@ -229,9 +250,16 @@ struct Solver {
 
 impl Solver {
     fn new(transport: &Transport, medium: &Medium) -> Result<Self, Error> {
-        let Transport { incidence, mut order } = *transport;
+        let Transport {
+            incidence,
+            mut order,
+        } = *transport;
         if order > 2 {
-            return Err(Error::new("transport: order", order.to_string(), "0, 1 or 2"));
+            return Err(Error::new(
+                "transport: order",
+                order.to_string(),
+                "0, 1 or 2",
+            ));
         }
         let scattering = medium.layers().iter().filter(|l| l.sigma_s_per_mm > 0.0);
         if scattering.clone().all(|l| l.g == 0.0) {
@@ -243,7 +271,10 @@ impl Solver {
         let mut slabs: Vec<Slab> = Vec::new();
         let mut tau = 0.0;
         for layer in medium.layers() {
-            let mut slab = Slab { tau, ..Slab::new(layer, order) };
+            let mut slab = Slab {
+                tau,
+                ..Slab::new(layer, order)
+            };
             tau += slab.sigma_t * slab.thickness_mm;
             // What lies below sends nothing back.
             let deep = slab.thickness_mm > slab.depth_mm();
@@ -267,8 +298,13 @@ impl Solver {
 
     /// The least and the highest frequency that a response needs, in rad/mm.
     fn frequencies(&self) -> (f64, f64) {
+        let scattering = self.slabs.iter().filter(|s| s.sigma_s > 0.0);
+        let first = scattering
+            .clone()
+            .map(|s| s.tau)
+            .fold(f64::INFINITY, f64::min);
         // What is deeper than this is not seen.
-        let seen = self.slabs.iter().filter(|s| s.tau < 8.0 && s.sigma_s > 0.0);
+        let seen = scattering.filter(|s| s.tau < first + 8.0);
         let densest = seen.clone().map(|s| s.sigma_t).fold(0.0, f64::max);
         let fade = |s: &Slab| s.layer.sigma_tr().max(0.3 / s.thickness_mm).min(s.sigma_t);
         let widest = seen.map(fade).fold(f64::INFINITY, f64::min);
@@ -288,10 +324,19 @@ impl Solver {
         if s == 0.0 && self.order == 0 {
             return vec![0.0]; // the cosine, of no effect
         }
-        let turns = |slab: &Slab| (2.0 - 0.5 * slab.tau).max(0.0) * s / slab.sigma_t;
+        let turns = |slab: &Slab| {
+            let gap = if slab.sigma_s == 0.0 {
+                4.0 * slab.thickness_mm
+            } else {
+                f64::INFINITY
+            };
+            (2.0 - 0.5 * slab.tau).max(0.0) * s * gap.min(1.0 / slab.sigma_t)
+        };
         let turns = self.slabs.iter().map(turns).fold(0.0, f64::max);
         let n = (6.0 + turns).min(MOST_AZIMUTHS).floor();
-        (0..n as usize).map(|l| ((l as f64 + 0.5) * FRAC_PI_2 / n).cos()).collect()
+        (0..n as usize)
+            .map(|l| ((l as f64 + 0.5) * FRAC_PI_2 / n).cos())
+            .collect()
     }
 
     /// One frequency, with the B harmonics (l, m) of `basis`, of which there are P pairs.
@@ -347,7 +392,8 @@ impl Solver {
             for (c, emitted) in sums.emitted.iter().enumerate() {
                 for (q, emitted) in emitted.iter().enumerate() {
                     for (b, emitted) in emitted.iter().enumerate() {
-                        sum += self.scatters(&cells[c], basis[b]) * emitted * x[(c * 2 + q) * B + b];
+                        sum +=
+                            self.scatters(&cells[c], basis[b]) * emitted * x[(c * 2 + q) * B + b];
                     }
                 }
             }
@@ -357,7 +403,10 @@ impl Solver {
             Incidence::Normal => self.once(s, &azimuths),
             Incidence::Cosine => first,
         };
-        Split { once, more: all - first }
+        Split {
+            once,
+            more: all - first,
+        }
     }
 
     /// What a cell scatters of a harmonic, per mm² of its face.
@@ -399,7 +448,9 @@ impl Solver {
     /// What a layer scatters, per mm and solid angle, from straight down to a cosine `mu` up: by Henyey &
     /// Greenstein's phase function; order 0 knows σs′ alone.
     fn back(&self, slab: &Slab, mu: f64) -> f64 {
-        let Layer { g, sigma_s_per_mm, .. } = slab.layer;
+        let Layer {
+            g, sigma_s_per_mm, ..
+        } = slab.layer;
         if self.order == 0 {
             return slab.sigma_s / (4.0 * PI);
         }
@@ -423,12 +474,14 @@ impl Solver {
             let outside = u.sqrt();
             let mu = (1.0 - (1.0 - u) / (self.eta * self.eta)).sqrt();
             let sin_theta = (1.0 - mu * mu).sqrt();
-            let share = weight * (1.0 - fresnel(mu, outside, self.eta)) / mu / azimuths.len() as f64;
+            let share =
+                weight * (1.0 - fresnel(mu, outside, self.eta)) / mu / azimuths.len() as f64;
             for cos_phi in azimuths {
                 let mut through = Complex::ONE;
                 for (b, cell) in source.iter_mut().zip(cells) {
                     let sigma_t = self.slabs[cell.slab].sigma_t;
-                    let x = Complex::new(sigma_t, s * sin_theta * cos_phi) * (cell.thickness_mm / mu);
+                    let x =
+                        Complex::new(sigma_t, s * sin_theta * cos_phi) * (cell.thickness_mm / mu);
                     let ray = Ray::new(x, through);
                     b[0] += share * ray.top0.re;
                     b[1] += share * 3.0 * ray.top1.re;
@@ -526,7 +579,11 @@ fn mesh(slabs: &[Slab], n: f64) -> Vec<Cell> {
         };
         let sizes = if s.thickness_mm == f64::INFINITY {
             // What only absorbs sends nothing back.
-            if s.sigma_s == 0.0 { Vec::new() } else { grow(s.depth_mm()) }
+            if s.sigma_s == 0.0 {
+                Vec::new()
+            } else {
+                grow(s.depth_mm())
+            }
         } else if s.sigma_s == 0.0 || s.thickness_mm <= 1.5 * size(0.0) {
             vec![s.thickness_mm]
         } else {
@@ -537,7 +594,11 @@ fn mesh(slabs: &[Slab], n: f64) -> Vec<Cell> {
             sizes.extend(mirrored.iter().rev());
             sizes
         };
-        cells.extend(sizes.into_iter().map(|thickness_mm| Cell { slab, thickness_mm }));
+        cells.extend(
+            sizes
+                .into_iter()
+                .map(|thickness_mm| Cell { slab, thickness_mm }),
+        );
     }
     cells
 }
@@ -648,7 +709,13 @@ impl<const B: usize, const P: usize> Sums<B, P> {
     /// Adds a direction of this share.
     fn add(&mut self, rays: &[Ray], y: [f64; B], share: f64, fresnel: f64) {
         // Re(i^(m′−m)·a) is Re a or Im a, but for its sign.
-        let part = |k: usize| if k < self.real { Complex::ONE } else { Complex::new(0.0, 1.0) };
+        let part = |k: usize| {
+            if k < self.real {
+                Complex::ONE
+            } else {
+                Complex::new(0.0, 1.0)
+            }
+        };
         let weights: [f64; P] = std::array::from_fn(|k| {
             let (b, b2) = self.pairs[k];
             share * y[b] * y[b2] * turned(self.basis[b2].1 + 4 - self.basis[b].1, part(k))
@@ -656,8 +723,14 @@ impl<const B: usize, const P: usize> Sums<B, P> {
         let (even, odd) = weights.split_at(self.real);
         let put = |to: &mut [f64; P], a: Complex| {
             let (reals, imaginaries) = to.split_at_mut(even.len());
-            reals.iter_mut().zip(even).for_each(|(to, w)| *to += w * a.re);
-            imaginaries.iter_mut().zip(odd).for_each(|(to, w)| *to += w * a.im);
+            reals
+                .iter_mut()
+                .zip(even)
+                .for_each(|(to, w)| *to += w * a.re);
+            imaginaries
+                .iter_mut()
+                .zip(odd)
+                .for_each(|(to, w)| *to += w * a.im);
         };
         for (i, ray) in rays.iter().enumerate() {
             let at = cell_pair(i, 0);
@@ -687,8 +760,15 @@ impl<const B: usize, const P: usize> Sums<B, P> {
 
     /// From harmonic b′ to b.
     fn harmonic(&self, sums: &[f64; P], b: usize, b2: usize) -> f64 {
-        let k = self.pairs.iter().position(|pair| *pair == (b.min(b2), b.max(b2)));
-        let swapped = if b > b2 { sign(self.basis[b].1 + self.basis[b2].1) } else { 1.0 };
+        let k = self
+            .pairs
+            .iter()
+            .position(|pair| *pair == (b.min(b2), b.max(b2)));
+        let swapped = if b > b2 {
+            sign(self.basis[b].1 + self.basis[b2].1)
+        } else {
+            1.0
+        };
         k.map_or(0.0, |k| swapped * sums[k])
     }
 }
@@ -709,7 +789,12 @@ fn turned(n: usize, a: Complex) -> f64 {
 }
 
 /// The real spherical harmonics, even in the azimuth.
-fn harmonics<const B: usize>(basis: [(usize, usize); B], mu: f64, sin: f64, cos_phi: f64) -> [f64; B] {
+fn harmonics<const B: usize>(
+    basis: [(usize, usize); B],
+    mu: f64,
+    sin: f64,
+    cos_phi: f64,
+) -> [f64; B] {
     basis.map(|lm| match lm {
         (0, 0) => (1.0 / (4.0 * PI)).sqrt(),
         (1, 0) => (3.0 / (4.0 * PI)).sqrt() * mu,
@@ -726,7 +811,9 @@ fn solve(a: &mut [f64], x: &mut [f64]) {
     let n = x.len();
     for k in 0..n {
         let size = |i: &usize| a[i * n + k].abs();
-        let pivot = (k..n).max_by(|i, j| size(i).total_cmp(&size(j))).unwrap_or(k);
+        let pivot = (k..n)
+            .max_by(|i, j| size(i).total_cmp(&size(j)))
+            .unwrap_or(k);
         if pivot != k {
             for j in k..n {
                 a.swap(k * n + j, pivot * n + j);

@@ -1,5 +1,5 @@
 //! What a layered medium does with light, by following light: the reference for the solver of
-//! [`physics`](crate::physics), with which it shares the description of a medium and no more.
+//! [`physics`](crate::physics), with which it shares the description of a medium and Fresnel's equations.
 
 use std::f64::consts::{PI, TAU};
 
@@ -161,8 +161,16 @@ fn path(medium: &Medium, incidence: Incidence, random: &mut Random, rings: &mut 
                 }
             } else {
                 // On the face itself, or rounding would leave it on the wrong side.
-                at[2] = if next > layer { top + here.thickness_mm } else { top };
-                top = if next > layer { at[2] } else { top - layers[next].thickness_mm };
+                at[2] = if next > layer {
+                    top + here.thickness_mm
+                } else {
+                    top
+                };
+                top = if next > layer {
+                    at[2]
+                } else {
+                    top - layers[next].thickness_mm
+                };
                 layer = next;
             }
         }
