@@ -775,7 +775,7 @@ impl<const B: usize, const P: usize> Sums<B, P> {
 
 /// (−1)ⁿ.
 fn sign(n: usize) -> f64 {
-    if n % 2 == 0 { 1.0 } else { -1.0 }
+    if n.is_multiple_of(2) { 1.0 } else { -1.0 }
 }
 
 /// Re(iⁿ·a).
