@@ -9,7 +9,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use super::quadrature::{directions, fresnel_inside, gauss};
+use super::quadrature::{directions, fresnel_inside, gauss, henyey_greenstein};
 use super::{Layer, Medium, Response};
 use crate::Error;
 
@@ -150,15 +150,13 @@ struct Once(Vec<(f64, f64)>);
 
 impl Once {
     fn new(layer: &Layer, eta: f64) -> Self {
-        let Layer { g, .. } = *layer;
         let sigma_t = layer.sigma_a_per_mm + layer.sigma_s_per_mm;
         let critical = (1.0 - 1.0 / (eta * eta)).sqrt().asin();
         let range = FRAC_PI_2 - critical;
         let at = |(t, weight): (f64, f64)| {
             let psi = critical + range * t * t * (3.0 - 2.0 * t);
             let (mu, cos) = psi.sin_cos();
-            let phase = (1.0 - g * g) / (4.0 * PI * (1.0 + g * g + 2.0 * g * mu).powf(1.5));
-            let leaves = phase * (1.0 - fresnel_inside(mu, eta)) * mu;
+            let leaves = henyey_greenstein(layer.g, -mu) * (1.0 - fresnel_inside(mu, eta)) * mu;
             let share = range * 6.0 * t * (1.0 - t) * weight;
             (
                 share * layer.sigma_s_per_mm * leaves,

@@ -4,6 +4,7 @@ pub mod artist;
 mod complex;
 mod diffusion;
 mod fit;
+mod kernel;
 mod medium;
 mod pigments;
 pub mod presets;

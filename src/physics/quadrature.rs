@@ -82,3 +82,8 @@ pub(super) fn directions(n: usize, eta: f64) -> Vec<Direction> {
         .map(|(t, w)| at(critical + leaves * ends(*t), leaves * slope(*t) * w));
     beyond.chain(within).collect()
 }
+
+/// Henyey & Greenstein's phase function of mean cosine g at a cosine between both ways.
+pub(super) fn henyey_greenstein(g: f64, cos: f64) -> f64 {
+    (1.0 - g * g) / (4.0 * PI * (1.0 + g * g - 2.0 * g * cos).powf(1.5))
+}

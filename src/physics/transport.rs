@@ -15,7 +15,8 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::complex::Complex;
-use super::quadrature::{Direction, directions, fresnel, gauss};
+use super::kernel::{Kernel, Ray, harmonics, solve};
+use super::quadrature::{Direction, directions, fresnel, gauss, henyey_greenstein};
 use super::{Layer, Medium, Response};
 use crate::Error;
 use crate::plan::nnls::nnls;
@@ -139,20 +140,12 @@ fn extend(samples: &mut Vec<(f64, Split)>) {
     };
     let b = (before.once * s0 - last.once * s1) / (1.0 / s0 - 1.0 / s1);
     let a = last.once * s1 - b / s1;
-    let ends = last.more > 0.0 && before.more > last.more;
-    let power = if ends {
-        (before.more / last.more).ln() / (s0 / s1).ln()
-    } else {
-        0.0
-    };
+    // At least as fast as single scattering, also where it is lost in rounding.
+    let power = ((before.more / last.more).ln() / (s0 / s1).ln()).min(-1.0);
     for octave in 1..=6 {
         let s = s1 * f64::from(1 << octave);
         let once = (a / s + b / (s * s)).max(0.0);
-        let more = if ends {
-            last.more * (s / s1).powf(power)
-        } else {
-            0.0
-        };
+        let more = last.more.max(0.0) * (s / s1).powf(power);
         samples.push((s, Split { once, more }));
     }
 }
@@ -207,13 +200,7 @@ impl Slab {
     fn new(layer: &Layer, order: usize) -> Self {
         let peak = layer.g.powi(order as i32 + 1);
         let sigma_s = layer.sigma_s_per_mm * (1.0 - peak);
-        let moment = |l: i32| {
-            if l as usize > order {
-                0.0
-            } else {
-                (layer.g.powi(l) - peak) / (1.0 - peak)
-            }
-        };
+        let moment = |l: i32| (layer.g.powi(l) - peak) / (1.0 - peak); // of use up to the order
         Self {
             sigma_t: layer.sigma_a_per_mm + sigma_s,
             sigma_s,
@@ -237,36 +224,40 @@ struct Cell {
     thickness_mm: f64,
 }
 
+/// A direction in which light comes in: its cosine inside, and its share of what enters.
+struct Incoming {
+    mu: f64,
+    share: f64,
+}
+
 struct Solver {
     slabs: Vec<Slab>,
     /// Both meshes of [`CELLS`].
     meshes: [Vec<Cell>; 2],
     /// Both sets of [`DIRECTIONS`].
     directions: [Vec<Direction>; 2],
+    incoming: Vec<Incoming>,
     incidence: Incidence,
     order: usize,
-    eta: f64,
 }
 
 impl Solver {
-    fn new(transport: &Transport, medium: &Medium) -> Result<Self, Error> {
-        let Transport {
+    fn new(
+        &Transport {
             incidence,
             mut order,
-        } = *transport;
+        }: &Transport,
+        medium: &Medium,
+    ) -> Result<Self, Error> {
+        let refuse = |needs| Err(Error::new("transport: order", order.to_string(), needs));
         if order > 2 {
-            return Err(Error::new(
-                "transport: order",
-                order.to_string(),
-                "0, 1 or 2",
-            ));
+            return refuse("0, 1 or 2");
         }
-        let scattering = medium.layers().iter().filter(|l| l.sigma_s_per_mm > 0.0);
-        if scattering.clone().all(|l| l.g == 0.0) {
+        let isotropic = |l: &Layer| l.g == 0.0 || l.sigma_s_per_mm == 0.0;
+        if medium.layers().iter().all(isotropic) {
             order = 0;
         } else if incidence == Incidence::Cosine && order > 0 {
-            let needs = "0 with cosine incidence, where layers have g";
-            return Err(Error::new("transport: order", order.to_string(), needs));
+            return refuse("0 with cosine incidence, where layers have g");
         }
         let mut slabs: Vec<Slab> = Vec::new();
         let mut tau = 0.0;
@@ -286,13 +277,28 @@ impl Solver {
                 break;
             }
         }
+        let eta = medium.eta();
+        let refracted = |(u, weight): (f64, f64)| {
+            let mu = (1.0 - (1.0 - u) / (eta * eta)).sqrt();
+            let share = weight * (1.0 - fresnel(mu, u.sqrt(), eta));
+            Incoming { mu, share }
+        };
         Ok(Self {
             meshes: if order == 0 { CELLS } else { MOMENT_CELLS }.map(|n| mesh(&slabs, n)),
-            directions: DIRECTIONS.map(|n| directions(n, medium.eta())),
+            directions: DIRECTIONS.map(|n| directions(n, eta)),
             slabs,
+            incoming: match incidence {
+                Incidence::Normal => vec![Incoming {
+                    mu: 1.0,
+                    share: 1.0,
+                }],
+                Incidence::Cosine => gauss(2 * DIRECTIONS[0])
+                    .into_iter()
+                    .map(refracted)
+                    .collect(),
+            },
             incidence,
             order,
-            eta: medium.eta(),
         })
     }
 
@@ -319,30 +325,28 @@ impl Solver {
         }
     }
 
-    /// Azimuths of a quarter turn: as many as the wave has turns along a ray before it has faded.
+    /// Cosines of azimuths of a quarter turn: as many as the wave has turns along a ray before it has faded.
     fn azimuths(&self, s: f64) -> Vec<f64> {
         if s == 0.0 && self.order == 0 {
-            return vec![0.0]; // the cosine, of no effect
+            return vec![0.0]; // of no effect
         }
         let turns = |slab: &Slab| {
-            let gap = if slab.sigma_s == 0.0 {
-                4.0 * slab.thickness_mm
+            let free = 1.0 / slab.sigma_t;
+            // Gaps do not fade, but end.
+            let free = if slab.sigma_s > 0.0 {
+                free
             } else {
-                f64::INFINITY
+                free.min(4.0 * slab.thickness_mm)
             };
-            (2.0 - 0.5 * slab.tau).max(0.0) * s * gap.min(1.0 / slab.sigma_t)
+            (2.0 - 0.5 * slab.tau).max(0.0) * s * free
         };
         let turns = self.slabs.iter().map(turns).fold(0.0, f64::max);
         let n = (6.0 + turns).min(MOST_AZIMUTHS).floor();
-        (0..n as usize)
-            .map(|l| ((l as f64 + 0.5) * FRAC_PI_2 / n).cos())
-            .collect()
+        let cos = |l: usize| ((l as f64 + 0.5) * FRAC_PI_2 / n).cos();
+        (0..n as usize).map(cos).collect()
     }
 
     /// One frequency, with the B harmonics (l, m) of `basis`, of which there are P pairs.
-    ///
-    /// The unknowns are x = i^−m·L_lm, which makes all coefficients real: azimuths φ and π − φ give a term
-    /// and its conjugate, times (−1)^(m + m′).
     fn solve_basis<const B: usize, const P: usize>(
         &self,
         s: f64,
@@ -351,88 +355,85 @@ impl Solver {
         let azimuths = self.azimuths(s);
         let coarse = azimuths.len() > 8 && self.incidence == Incidence::Normal;
         let cells = &self.meshes[usize::from(coarse)];
-        let n = cells.len();
-        let mut sums = Sums::<B, P>::new(basis, n);
-        let mut source = vec![[0.0; 2]; n];
-        if self.incidence == Incidence::Cosine {
-            self.cosine_source(s, &azimuths, cells, &mut source);
-        } else {
-            self.normal_source(cells, &mut source);
-        }
-        let mut rays: Vec<Ray> = vec![Ray::default(); n];
+        let mut kernel = Kernel::<B, P>::new(basis, cells.len());
+        let mut rays = vec![Ray::default(); cells.len()];
         for d in &self.directions[0] {
+            let sin = (1.0 - d.mu * d.mu).sqrt();
+            let share = TAU * d.weight / azimuths.len() as f64;
             for cos_phi in &azimuths {
-                let sin_theta = (1.0 - d.mu * d.mu).sqrt();
-                let slant = 1.0 / d.mu;
-                let wave = s * sin_theta * cos_phi * slant;
-                let mut through = Complex::ONE;
-                for (ray, cell) in rays.iter_mut().zip(cells) {
-                    let sigma_t = self.slabs[cell.slab].sigma_t;
-                    let x = Complex::new(sigma_t * slant, wave) * cell.thickness_mm;
-                    *ray = Ray::new(x, through);
-                    through = through * ray.pass;
-                }
-                let share = TAU * d.weight / azimuths.len() as f64;
-                let y = harmonics(basis, d.mu, sin_theta, *cos_phi);
-                sums.add(&rays, y, share * slant, d.fresnel);
-                // What leaves: upward, where Y_lm is times (−1)^(l+m).
-                let leaves = share * (1.0 - d.fresnel);
-                for (emitted, ray) in sums.emitted.iter_mut().zip(&rays) {
-                    for (q, top) in [ray.top0, ray.top1].into_iter().enumerate() {
-                        for (b, (l, m)) in basis.into_iter().enumerate() {
-                            emitted[q][b] += leaves * y[b] * sign(l + m) * turned(m, top);
-                        }
+                self.trace(cells, d.mu, s * sin * cos_phi, &mut rays);
+                kernel.add(&rays, harmonics(basis, d.mu, sin, *cos_phi), share, d);
+            }
+        }
+        // Light not yet scattered. Isotropic scattering minds its fluence alone, where it comes in aslant.
+        let straight = harmonics(basis, 1.0, 0.0, 1.0);
+        let mut source = vec![0.0; 2 * B * cells.len()];
+        for Incoming { mu, share } in &self.incoming {
+            let sin = (1.0 - mu * mu).sqrt();
+            // Straight down, none matters.
+            let azimuths = &azimuths[..if *mu < 1.0 { azimuths.len() } else { 1 }];
+            let share = share / mu / azimuths.len() as f64;
+            for cos_phi in azimuths {
+                self.trace(cells, *mu, s * sin * cos_phi, &mut rays);
+                for (to, ray) in source.chunks_mut(2 * B).zip(&rays) {
+                    for (b, y) in straight.iter().enumerate() {
+                        to[b] += share * y * ray.top[0].re;
+                        to[B + b] += share * y * 3.0 * ray.top[1].re;
                     }
                 }
             }
         }
-        let x = self.scatter(basis, cells, &sums, &source);
-        let [first, all] = x.map(|x| {
-            let mut sum = 0.0;
-            for (c, emitted) in sums.emitted.iter().enumerate() {
-                for (q, emitted) in emitted.iter().enumerate() {
-                    for (b, emitted) in emitted.iter().enumerate() {
-                        sum +=
-                            self.scatters(&cells[c], basis[b]) * emitted * x[(c * 2 + q) * B + b];
-                    }
-                }
-            }
-            sum
-        });
-        let once = match self.incidence {
-            Incidence::Normal => self.once(s, &azimuths),
-            Incidence::Cosine => first,
+        let scatters = |cell: usize, l: usize| {
+            let Cell { slab, thickness_mm } = cells[cell];
+            self.slabs[slab].sigma_s * self.slabs[slab].moments[l] * thickness_mm
         };
+        // (I − K)x = b.
+        let mut matrix = kernel.matrix(scatters);
+        let size = source.len();
+        for (i, k) in matrix.iter_mut().enumerate() {
+            *k = if i % (size + 1) == 0 { 1.0 - *k } else { -*k };
+        }
+        let mut light = source.clone();
+        solve(&mut matrix, &mut light);
+        let emitted = kernel.emitted(scatters);
+        let leaves = |x: &[f64]| emitted.iter().zip(x).map(|(e, x)| e * x).sum::<f64>();
+        let first = leaves(&source);
         Split {
-            once,
-            more: all - first,
+            once: match self.incidence {
+                Incidence::Normal => self.once(s, &azimuths),
+                Incidence::Cosine => first,
+            },
+            more: leaves(&light) - first,
         }
     }
 
-    /// What a cell scatters of a harmonic, per mm² of its face.
-    fn scatters(&self, cell: &Cell, (l, _): (usize, usize)) -> f64 {
-        let slab = &self.slabs[cell.slab];
-        slab.sigma_s * slab.moments[l] * cell.thickness_mm
+    /// A direction through the cells, of a wave that turns by `wave` a mm of the way.
+    fn trace(&self, cells: &[Cell], mu: f64, wave: f64, rays: &mut [Ray]) {
+        let mut through = Complex::ONE;
+        for (ray, cell) in rays.iter_mut().zip(cells) {
+            let sigma_t = self.slabs[cell.slab].sigma_t;
+            *ray = Ray::new(
+                Complex::new(sigma_t, wave) * (cell.thickness_mm / mu),
+                through,
+            );
+            through = through * ray.pass;
+        }
     }
 
     /// What of light that came straight down leaves after one event, with the exact phase function.
     fn once(&self, s: f64, azimuths: &[f64]) -> f64 {
         let mut sum = 0.0;
-        for d in &self.directions[1] {
-            let slant = 1.0 / d.mu;
+        for d in self.directions[1].iter().filter(|d| d.fresnel < 1.0) {
             let leaves = TAU * d.weight * (1.0 - d.fresnel) / azimuths.len() as f64;
-            if leaves == 0.0 {
-                continue;
-            }
+            let sin = (1.0 - d.mu * d.mu).sqrt();
             for cos_phi in azimuths {
-                let wave = s * (1.0 - d.mu * d.mu).sqrt() * cos_phi * slant;
                 let mut through = Complex::ONE;
                 for slab in &self.slabs {
-                    let fade = Complex::new(slab.sigma_t * (1.0 + slant), wave);
-                    let pass = if slab.thickness_mm == f64::INFINITY {
-                        Complex::default()
-                    } else {
-                        (fade * slab.thickness_mm).exp_neg()
+                    let fade =
+                        Complex::new(slab.sigma_t * (1.0 + d.mu), s * sin * cos_phi) * (1.0 / d.mu);
+                    let pass = match slab.thickness_mm {
+                        f64::INFINITY => Complex::default(),
+                        mm => (fade * mm).exp_neg(),
                     };
                     if slab.sigma_s > 0.0 {
                         let scattered = through * (Complex::ONE - pass) * fade.recip();
@@ -448,117 +449,10 @@ impl Solver {
     /// What a layer scatters, per mm and solid angle, from straight down to a cosine `mu` up: by Henyey &
     /// Greenstein's phase function; order 0 knows σs′ alone.
     fn back(&self, slab: &Slab, mu: f64) -> f64 {
-        let Layer {
-            g, sigma_s_per_mm, ..
-        } = slab.layer;
         if self.order == 0 {
             return slab.sigma_s / (4.0 * PI);
         }
-        sigma_s_per_mm * (1.0 - g * g) / (4.0 * PI * (1.0 + g * g + 2.0 * g * mu).powf(1.5))
-    }
-
-    /// Fluence, as a mean and a slope in each cell, of light straight down.
-    fn normal_source(&self, cells: &[Cell], source: &mut [[f64; 2]]) {
-        let mut through = Complex::ONE;
-        for (b, cell) in source.iter_mut().zip(cells) {
-            let x = Complex::new(self.slabs[cell.slab].sigma_t * cell.thickness_mm, 0.0);
-            let ray = Ray::new(x, through);
-            *b = [ray.top0.re, 3.0 * ray.top1.re];
-            through = through * ray.pass;
-        }
-    }
-
-    /// The same of light from everywhere, refracted.
-    fn cosine_source(&self, s: f64, azimuths: &[f64], cells: &[Cell], source: &mut [[f64; 2]]) {
-        for (u, weight) in gauss(2 * DIRECTIONS[0]) {
-            let outside = u.sqrt();
-            let mu = (1.0 - (1.0 - u) / (self.eta * self.eta)).sqrt();
-            let sin_theta = (1.0 - mu * mu).sqrt();
-            let share =
-                weight * (1.0 - fresnel(mu, outside, self.eta)) / mu / azimuths.len() as f64;
-            for cos_phi in azimuths {
-                let mut through = Complex::ONE;
-                for (b, cell) in source.iter_mut().zip(cells) {
-                    let sigma_t = self.slabs[cell.slab].sigma_t;
-                    let x =
-                        Complex::new(sigma_t, s * sin_theta * cos_phi) * (cell.thickness_mm / mu);
-                    let ray = Ray::new(x, through);
-                    b[0] += share * ray.top0.re;
-                    b[1] += share * 3.0 * ray.top1.re;
-                    through = through * ray.pass;
-                }
-            }
-        }
-    }
-
-    /// The moments of light not yet scattered, b, and of all light, x = b + Kx.
-    fn scatter<const B: usize, const P: usize>(
-        &self,
-        basis: [(usize, usize); B],
-        cells: &[Cell],
-        sums: &Sums<B, P>,
-        source: &[[f64; 2]],
-    ) -> [Vec<f64>; 2] {
-        let n = cells.len();
-        let index = |i: usize, p: usize, b: usize| (i * 2 + p) * B + b;
-        let scatters = |i: usize, b: usize| self.scatters(&cells[i], basis[b]);
-        let size = 2 * B * n;
-        let mut k = vec![0.0; size * size];
-        let receive = [1.0, 3.0];
-        for i in 0..n {
-            for c in 0..=i {
-                let at = cell_pair(i, c);
-                for (p, q) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                    for b in 0..B {
-                        for b2 in 0..B {
-                            let [(l, _), (l2, m2)] = [basis[b], basis[b2]];
-                            let direct = sums.harmonic(&sums.direct[at][p * 2 + q], b, b2);
-                            let mirrored = sums.harmonic(&sums.mirrored[at][p * 2 + q], b, b2);
-                            // From c, above, to i: straight down, or up and mirrored.
-                            let down = receive[p] * (sign(q) * direct + sign(l2 + m2) * mirrored);
-                            k[index(i, p, b) * size + index(c, q, b2)] += down * scatters(c, b2);
-                            if c < i {
-                                // From i to c: straight up, or mirrored.
-                                let up = receive[q]
-                                    * (sign(q + l + l2) * direct + sign(l + m2) * mirrored);
-                                k[index(c, q, b2) * size + index(i, p, b)] += up * scatters(i, b);
-                            }
-                        }
-                    }
-                }
-            }
-        }
-        for (c, own) in sums.own.iter().enumerate() {
-            for (p, q) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                for b in 0..B {
-                    for b2 in 0..B {
-                        let [(l, m), (l2, m2)] = [basis[b], basis[b2]];
-                        let both = 1.0 + sign(p + q + l + l2 + m + m2);
-                        k[index(c, p, b) * size + index(c, q, b2)] +=
-                            both * sums.harmonic(&own[p * 2 + q], b, b2) * scatters(c, b2);
-                    }
-                }
-            }
-        }
-        let straight = harmonics(basis, 1.0, 0.0, 1.0);
-        let mut x = vec![0.0; size];
-        for (i, source) in source.iter().enumerate() {
-            for p in 0..2 {
-                for b in 0..B {
-                    x[index(i, p, b)] = match self.incidence {
-                        Incidence::Normal => source[p] * straight[b],
-                        // The fluence alone matters to isotropic scattering.
-                        Incidence::Cosine => source[p] * (1.0 / (4.0 * PI)).sqrt(),
-                    };
-                }
-            }
-        }
-        let unscattered = x.clone();
-        for (i, k) in k.iter_mut().enumerate() {
-            *k = if i % (size + 1) == 0 { 1.0 - *k } else { -*k };
-        }
-        solve(&mut k, &mut x);
-        [unscattered, x]
+        slab.layer.sigma_s_per_mm * henyey_greenstein(slab.layer.g, -mu)
     }
 }
 
@@ -579,11 +473,7 @@ fn mesh(slabs: &[Slab], n: f64) -> Vec<Cell> {
         };
         let sizes = if s.thickness_mm == f64::INFINITY {
             // What only absorbs sends nothing back.
-            if s.sigma_s == 0.0 {
-                Vec::new()
-            } else {
-                grow(s.depth_mm())
-            }
+            grow(if s.sigma_s > 0.0 { s.depth_mm() } else { 0.0 })
         } else if s.sigma_s == 0.0 || s.thickness_mm <= 1.5 * size(0.0) {
             vec![s.thickness_mm]
         } else {
@@ -594,247 +484,8 @@ fn mesh(slabs: &[Slab], n: f64) -> Vec<Cell> {
             sizes.extend(mirrored.iter().rev());
             sizes
         };
-        cells.extend(
-            sizes
-                .into_iter()
-                .map(|thickness_mm| Cell { slab, thickness_mm }),
-        );
+        let cell = |thickness_mm| Cell { slab, thickness_mm };
+        cells.extend(sizes.into_iter().map(cell));
     }
     cells
-}
-
-/// A direction through a cell. Of light u of the way through, ∫e^−xu du and ∫(2u − 1)e^−xu du are what the
-/// cell's mean and its slope receive and emit.
-#[derive(Clone, Copy, Default)]
-struct Ray {
-    /// What passes the whole cell: e^−x.
-    pass: Complex,
-    mean: Complex,
-    slope: Complex,
-    /// Mean and slope times what passes all cells above.
-    top0: Complex,
-    top1: Complex,
-    /// Mean to mean, slope to mean and slope to slope within the cell, one way.
-    own: [Complex; 3],
-}
-
-impl Ray {
-    fn new(x: Complex, through: Complex) -> Self {
-        let pass = x.exp_neg();
-        let (mean, slope, own);
-        if x.norm_squared() < 0.04 {
-            let mut power = Complex::ONE; // (−x)ⁿ/n!
-            let mut sums = [Complex::default(); 5];
-            for n in 0..9 {
-                let n = f64::from(n);
-                for (sum, part) in sums.iter_mut().zip([
-                    1.0 / (n + 1.0),
-                    n / ((n + 1.0) * (n + 2.0)),
-                    1.0 / ((n + 1.0) * (n + 2.0)),
-                    // slope/x: the next term of the slope's series, shifted.
-                    -1.0 / ((n + 2.0) * (n + 3.0)),
-                    1.0 / (n + 1.0) - 3.0 / (n + 2.0) + 2.0 / (n + 4.0),
-                ]) {
-                    *sum += power * part;
-                }
-                power = power * x * (-1.0 / (n + 1.0));
-            }
-            mean = sums[0];
-            slope = sums[1];
-            own = [sums[2], sums[3], sums[4]];
-        } else {
-            let inverse = x.recip();
-            let one = Complex::ONE;
-            mean = (one - pass) * inverse;
-            let first = (mean - pass) * inverse; // ∫u e^−xu du
-            let second = (first * 2.0 - pass) * inverse;
-            let third = (second * 3.0 - pass) * inverse;
-            slope = first * 2.0 - mean;
-            own = [
-                (one - mean) * inverse,
-                slope * inverse,
-                mean - first * 3.0 + third * 2.0,
-            ];
-        }
-        Self {
-            pass,
-            mean,
-            slope,
-            top0: through * mean,
-            top1: through * slope,
-            own,
-        }
-    }
-}
-
-/// What the directions sum to, but for what does not depend on them. [2p + q] is from the cells' part q
-/// (mean, slope) to part p, [k] between the harmonics of pair k.
-struct Sums<const B: usize, const P: usize> {
-    /// Down from cell c to cell i > c, at [`cell_pair`].
-    direct: Vec<[[f64; P]; 4]>,
-    /// Up from cell c to the surface and back down to cell i ≥ c.
-    mirrored: Vec<[[f64; P]; 4]>,
-    /// Down within a cell.
-    own: Vec<[[f64; P]; 4]>,
-    /// Out of the surface, from a cell's mean and slope.
-    emitted: Vec<[[f64; B]; 2]>,
-    basis: [(usize, usize); B],
-    /// Pairs b ≤ b′: first those with m + m′ even, which take the real part of what a ray carries.
-    pairs: [(usize, usize); P],
-    real: usize,
-}
-
-fn cell_pair(i: usize, c: usize) -> usize {
-    i * (i + 1) / 2 + c
-}
-
-impl<const B: usize, const P: usize> Sums<B, P> {
-    fn new(basis: [(usize, usize); B], cells: usize) -> Self {
-        let odd = |&(b, b2): &(usize, usize)| (basis[b].1 + basis[b2].1) % 2 == 1;
-        let mut list: Vec<_> = (0..B).flat_map(|b| (b..B).map(move |b2| (b, b2))).collect();
-        list.sort_by_key(odd);
-        let mut pairs = [(0, 0); P];
-        pairs.copy_from_slice(&list);
-        Self {
-            direct: vec![[[0.0; P]; 4]; cell_pair(cells, 0)],
-            mirrored: vec![[[0.0; P]; 4]; cell_pair(cells, 0)],
-            own: vec![[[0.0; P]; 4]; cells],
-            emitted: vec![[[0.0; B]; 2]; cells],
-            basis,
-            real: pairs.iter().filter(|pair| !odd(pair)).count(),
-            pairs,
-        }
-    }
-
-    /// Adds a direction of this share.
-    fn add(&mut self, rays: &[Ray], y: [f64; B], share: f64, fresnel: f64) {
-        // Re(i^(m′−m)·a) is Re a or Im a, but for its sign.
-        let part = |k: usize| {
-            if k < self.real {
-                Complex::ONE
-            } else {
-                Complex::new(0.0, 1.0)
-            }
-        };
-        let weights: [f64; P] = std::array::from_fn(|k| {
-            let (b, b2) = self.pairs[k];
-            share * y[b] * y[b2] * turned(self.basis[b2].1 + 4 - self.basis[b].1, part(k))
-        });
-        let (even, odd) = weights.split_at(self.real);
-        let put = |to: &mut [f64; P], a: Complex| {
-            let (reals, imaginaries) = to.split_at_mut(even.len());
-            reals
-                .iter_mut()
-                .zip(even)
-                .for_each(|(to, w)| *to += w * a.re);
-            imaginaries
-                .iter_mut()
-                .zip(odd)
-                .for_each(|(to, w)| *to += w * a.im);
-        };
-        for (i, ray) in rays.iter().enumerate() {
-            let at = cell_pair(i, 0);
-            let top = [ray.top0 * fresnel, ray.top1 * fresnel];
-            for (to, from) in self.mirrored[at..=at + i].iter_mut().zip(rays) {
-                put(&mut to[0], top[0] * from.top0);
-                put(&mut to[1], top[0] * from.top1);
-                put(&mut to[2], top[1] * from.top0);
-                put(&mut to[3], top[1] * from.top1);
-            }
-            // From the nearest cell above to the furthest.
-            let mut near = [ray.mean, ray.slope];
-            for (to, from) in self.direct[at..at + i].iter_mut().zip(rays).rev() {
-                put(&mut to[0], near[0] * from.mean);
-                put(&mut to[1], near[0] * from.slope);
-                put(&mut to[2], near[1] * from.mean);
-                put(&mut to[3], near[1] * from.slope);
-                near = near.map(|near| near * from.pass);
-            }
-            let own = &mut self.own[i];
-            put(&mut own[0], ray.own[0]);
-            put(&mut own[1], ray.own[1]);
-            put(&mut own[2], ray.own[1] * -3.0);
-            put(&mut own[3], ray.own[2]);
-        }
-    }
-
-    /// From harmonic b′ to b.
-    fn harmonic(&self, sums: &[f64; P], b: usize, b2: usize) -> f64 {
-        let k = self
-            .pairs
-            .iter()
-            .position(|pair| *pair == (b.min(b2), b.max(b2)));
-        let swapped = if b > b2 {
-            sign(self.basis[b].1 + self.basis[b2].1)
-        } else {
-            1.0
-        };
-        k.map_or(0.0, |k| swapped * sums[k])
-    }
-}
-
-/// (−1)ⁿ.
-fn sign(n: usize) -> f64 {
-    if n.is_multiple_of(2) { 1.0 } else { -1.0 }
-}
-
-/// Re(iⁿ·a).
-fn turned(n: usize, a: Complex) -> f64 {
-    match n % 4 {
-        0 => a.re,
-        1 => -a.im,
-        2 => -a.re,
-        _ => a.im,
-    }
-}
-
-/// The real spherical harmonics, even in the azimuth.
-fn harmonics<const B: usize>(
-    basis: [(usize, usize); B],
-    mu: f64,
-    sin: f64,
-    cos_phi: f64,
-) -> [f64; B] {
-    basis.map(|lm| match lm {
-        (0, 0) => (1.0 / (4.0 * PI)).sqrt(),
-        (1, 0) => (3.0 / (4.0 * PI)).sqrt() * mu,
-        (1, 1) => (3.0 / (4.0 * PI)).sqrt() * sin * cos_phi,
-        (2, 0) => (5.0 / (16.0 * PI)).sqrt() * (3.0 * mu * mu - 1.0),
-        (2, 1) => (15.0 / (4.0 * PI)).sqrt() * mu * sin * cos_phi,
-        _ => (15.0 / (16.0 * PI)).sqrt() * sin * sin * (2.0 * cos_phi * cos_phi - 1.0),
-    })
-}
-
-/// Solves the square system in place, by Gauss' elimination with pivots; `x` is the right side, then the
-/// solution.
-fn solve(a: &mut [f64], x: &mut [f64]) {
-    let n = x.len();
-    for k in 0..n {
-        let size = |i: &usize| a[i * n + k].abs();
-        let pivot = (k..n)
-            .max_by(|i, j| size(i).total_cmp(&size(j)))
-            .unwrap_or(k);
-        if pivot != k {
-            for j in k..n {
-                a.swap(k * n + j, pivot * n + j);
-            }
-            x.swap(k, pivot);
-        }
-        let (above, below) = a.split_at_mut((k + 1) * n);
-        let row = &above[k * n + k..];
-        for i in k + 1..n {
-            let target = &mut below[(i - k - 1) * n + k..(i - k) * n];
-            let factor = target[0] / row[0];
-            if factor != 0.0 {
-                for (t, r) in target.iter_mut().zip(row) {
-                    *t -= factor * r;
-                }
-                x[i] -= factor * x[k];
-            }
-        }
-    }
-    for k in (0..n).rev() {
-        let known: f64 = (k + 1..n).map(|j| a[k * n + j] * x[j]).sum();
-        x[k] = (x[k] - known) / a[k * n + k];
-    }
 }
