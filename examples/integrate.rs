@@ -1,70 +1,56 @@
-//! The smallest host: hands a frame to the effect in screen space and an atlas to the one in texture
-//! space, and reads both results back. Choosing the mode is choosing which of them a final pass samples.
+//! The smallest host: hands a frame to the effect in screen space and an atlas to the one in texture space,
+//! and reads both results back. Choosing the mode is choosing which of them a final pass samples.
 //!
-//! Both are made up on the CPU, a plane lit on its right half; a renderer hands over the textures it
-//! has. What a host writes is `struct Skin` or `struct SkinAtlas`, and their functions.
+//! Both inputs are made up on the CPU, a plane lit on its right half; a renderer hands over the textures
+//! that it has. What a host writes is `struct Skin` or `struct SkinAtlas`, and their functions.
 
 use glam::Mat4;
-use subsurface::renderer::Gpu;
-use subsurface::wgpu::{self, TextureFormat};
-use subsurface::{
-    Atlas, DEFAULT_MAX_ERROR, Error, Plan, PlannedScreenSpace, Profile, ScreenFrame, TextureSpace,
-};
+use subsurface::wgpu::{CommandEncoder, Device, Queue, TextureFormat, TextureView};
+use subsurface::{Atlas, Error, Frame, Plan, Profile, ScreenSpace, TextureSpace, View};
+use subsurface_lab::renderer::Gpu;
 
 /// What the deferred renderer has by the time its diffuse light is done.
-struct Frame {
-    irradiance: wgpu::TextureView,
-    depth: wgpu::TextureView,
-    profile_id: wgpu::TextureView,
-    scattered: wgpu::TextureView,
+struct GBuffer {
+    irradiance: TextureView,
+    depth: TextureView,
+    profile_id: TextureView,
     projection: Mat4,
 }
 
-// The integration: README.md shows these lines.
+// The integration, as README.md shows it.
 struct Skin {
-    plan: Plan,
-    effect: PlannedScreenSpace,
+    effect: ScreenSpace, // shared by all cameras
+    view: View,          // one for each camera
 }
 
 impl Skin {
-    fn new(device: &wgpu::Device) -> Result<Self, Error> {
-        Ok(Self {
-            plan: Plan::new(&[Profile::SKIN], DEFAULT_MAX_ERROR)?, // some seconds
-            effect: PlannedScreenSpace::new(device, TextureFormat::Rgba16Float)?,
-        })
+    fn new(device: &Device) -> Result<Self, Error> {
+        let effect = ScreenSpace::new(device, TextureFormat::Rgba16Float, &Plan::skin())?;
+        let view = View::new();
+        Ok(Self { effect, view })
     }
 
     /// After lighting, before specular and tone mapping.
     fn scatter(
         &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        encoder: &mut wgpu::CommandEncoder,
-        frame: &Frame,
+        device: &Device,
+        queue: &Queue,
+        encoder: &mut CommandEncoder,
+        g: &GBuffer,
+        scattered: &TextureView,
     ) -> Result<(), Error> {
-        let inputs = ScreenFrame {
-            irradiance: &frame.irradiance,       // linear, without albedo
-            depth: &frame.depth,                 // as the projection wrote it
-            profile_id: Some(&frame.profile_id), // 1 on skin, 0 elsewhere
-            normal: None,
-            strength: None,
-            viewport: None,
-            output: &frame.scattered, // multiply this one by the albedo
-            projection: frame.projection,
-            mm_per_unit: 1000.0, // a scene in metres
-            profiles: &[Profile::SKIN],
-        };
-        self.effect.prepare(device, queue, &inputs, &self.plan)?;
-        self.effect.render(encoder);
-        Ok(())
+        let mut frame = Frame::new(&g.irradiance, &g.depth, g.projection.to_cols_array_2d());
+        frame.profile_id = Some(&g.profile_id); // 1 on skin, 0 elsewhere
+        frame.mm_per_unit = 1000.0; // a scene in metres
+        self.view.prepare(device, queue, &self.effect, &frame)?;
+        self.view.render(encoder, scattered)
     }
 }
 
 /// What it has by the time it has drawn the head into its atlas, by `TextureSpace::VERTEX_WGSL`.
 struct Unrolled {
-    irradiance: wgpu::TextureView,
-    positions: wgpu::TextureView,
-    scattered: wgpu::TextureView,
+    irradiance: TextureView,
+    positions: TextureView,
 }
 
 // The integration in texture space.
@@ -73,44 +59,46 @@ struct SkinAtlas {
 }
 
 impl SkinAtlas {
-    fn new(device: &wgpu::Device) -> Result<Self, Error> {
-        let effect = TextureSpace::new(device, TextureFormat::Rgba16Float)?;
+    fn new(device: &Device) -> Result<Self, Error> {
+        let effect = TextureSpace::new(device, TextureFormat::Rgba16Float, &[Profile::SKIN])?;
         Ok(Self { effect })
     }
 
     /// After the atlas is lit, before the head is drawn with what comes out.
     fn scatter(
         &mut self,
-        device: &wgpu::Device,
-        encoder: &mut wgpu::CommandEncoder,
+        device: &Device,
+        queue: &Queue,
+        encoder: &mut CommandEncoder,
         unrolled: &Unrolled,
+        scattered: &TextureView,
     ) -> Result<(), Error> {
-        let inputs = Atlas {
+        let atlas = Atlas {
             irradiance: &unrolled.irradiance,
             positions: &unrolled.positions, // in metres, and 1 where there is skin
-            output: &unrolled.scattered,    // sample this one by the mesh's UVs
             mm_per_unit: 1000.0,
-            profiles: &[Profile::SKIN],
         };
-        self.effect.prepare(device, &inputs)?;
-        self.effect.render(encoder);
-        Ok(())
+        self.effect.prepare(device, queue, &atlas)?;
+        self.effect.render(encoder, scattered)
     }
 }
 
-fn main() -> Result<(), Error> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let gpu = Gpu::headless()?;
     let frame = made_up_frame(&gpu);
     let unrolled = made_up_atlas(&gpu);
+    let [on_screen, on_atlas] = ["scattered", "scattered atlas"]
+        .map(|name| gpu.target(name, SIZE, TextureFormat::Rgba16Float));
     let mut skin = Skin::new(&gpu.device)?;
     let mut atlas = SkinAtlas::new(&gpu.device)?;
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    skin.scatter(&gpu.device, &gpu.queue, &mut encoder, &frame)?;
-    atlas.scatter(&gpu.device, &mut encoder, &unrolled)?;
-    gpu.queue.submit([encoder.finish()]);
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    let mut encoder = device.create_command_encoder(&Default::default());
+    skin.scatter(device, queue, &mut encoder, &frame, &on_screen)?;
+    atlas.scatter(device, queue, &mut encoder, &unrolled, &on_atlas)?;
+    queue.submit([encoder.finish()]);
 
-    let screen = gpu.read(&frame.scattered);
-    let texture = gpu.read(&unrolled.scattered);
+    let screen = gpu.read(&on_screen);
+    let texture = gpu.read(&on_atlas);
     println!("        screen space         texture space");
     println!("   mm   red  green   blue    red  green   blue");
     let [width, _] = SIZE.map(|s| s as usize);
@@ -132,14 +120,13 @@ fn light() -> Vec<[f32; 4]> {
 }
 
 /// A plane half a metre away.
-fn made_up_frame(gpu: &Gpu) -> Frame {
+fn made_up_frame(gpu: &Gpu) -> GBuffer {
     let count = (SIZE[0] * SIZE[1]) as usize;
     let half = SIZE.map(|s| s as f32 / PX_PER_MM / 2000.0);
-    Frame {
+    GBuffer {
         irradiance: gpu.upload("irradiance", SIZE, TextureFormat::Rgba32Float, &light()),
         depth: gpu.upload("depth", SIZE, TextureFormat::R32Float, &vec![0.5f32; count]),
         profile_id: gpu.upload("profile id", SIZE, TextureFormat::R8Uint, &vec![1u8; count]),
-        scattered: gpu.target("scattered", SIZE, TextureFormat::Rgba16Float),
         // Orthographic, a metre deep.
         projection: glam::camera::rh::proj::directx::orthographic(
             -half[0], half[0], -half[1], half[1], 0.0, 1.0,
@@ -156,6 +143,5 @@ fn made_up_atlas(gpu: &Gpu) -> Unrolled {
     Unrolled {
         irradiance: gpu.upload("irradiance of the atlas", SIZE, full, &light()),
         positions: gpu.upload("positions", SIZE, full, &positions),
-        scattered: gpu.target("scattered atlas", SIZE, TextureFormat::Rgba16Float),
     }
 }

@@ -17,6 +17,8 @@
 @group(0) @binding(12) var linear: sampler;
 // How much a pixel takes of its scattered light.
 @group(0) @binding(4) var strength: texture_2d<f32>;
+// What multiplies what is added to a target.
+@group(0) @binding(5) var albedo: texture_2d<f32>;
 
 // How many blurs share their taps: (i, j) with i² + j² ≤ 2, or ≤ 4 where they are thirteen. One more may
 // have the square of 5×5, which is summed where it has weight.
@@ -194,6 +196,18 @@ struct Gathered {
     own: vec3f,
 }
 
+// Weights lie between those of two rows, and on simple tiles between those of the corners. Where one fades
+// to nothing what is left of it is a rounding error, of either sign: about 1e-7 on this side of 1, and more
+// where a GPU interpolates in fixed point. Nothing may be divided by it.
+const NEGLIGIBLE_WEIGHT = 1e-4;
+
+// The part that blurs have of the light, from what their taps found and what these weigh; of a weight that
+// is negligible the pixel's own light takes the place.
+fn blurred_by(light: vec3f, mass: vec3f, wanted: vec3f, e: vec3f) -> vec3f {
+    let mean = light / max(mass, vec3f(1e-20));
+    return wanted * select(e, mean, wanted > vec3f(NEGLIGIBLE_WEIGHT));
+}
+
 // On no surface of the coarser level, a < 0, this level's own light stands in for it.
 fn with_coarser(blurred: vec3f, wanted: vec3f, e: vec3f, rest: vec3f, coarser: vec4f) -> Gathered {
     let own = select(e, blurred / max(wanted, vec3f(1e-6)), wanted > vec3f(1e-3));
@@ -207,11 +221,17 @@ fn mean_of(g: Gathered) -> vec4f {
     return half_floats(vec4f(mean, 1.0));
 }
 
-// What fs_frame tells of a pixel that takes so much of its scattered light: all of it, or what it differs
-// by from before. Writes no alpha: it is the host's.
-fn scattered(g: Gathered, e: vec3f, share: f32) -> vec4f {
+// What fs_frame tells of a pixel that takes so much of its scattered light: all of it, or, to be added, what
+// it differs by from before. Writes no alpha: it is the host's.
+fn scattered(pixel: vec2i, g: Gathered, e: vec3f, share: f32) -> vec4f {
     let difference = share * (g.light - e * g.weight);
-    return vec4f(select(e + difference, difference, DIFFERENCE), 1.0);
+    if !DIFFERENCE {
+        return vec4f(e + difference, 1.0);
+    }
+    if view.has_albedo == 0u {
+        return vec4f(difference, 1.0);
+    }
+    return vec4f(difference * textureLoad(albedo, vec2i(view.first_pixel) + pixel, 0).rgb, 1.0);
 }
 
 fn share_at(pixel: vec2i) -> f32 {

@@ -176,7 +176,7 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
     var blurred = vec3f(0.0);
     if any(wanted > vec3f(0.0)) {
         gather();
-        blurred = wanted * light / max(mass, vec3f(1e-20));
+        blurred = blurred_by(light, mass, wanted, e);
     }
     let rest = rest_at(scale);
     var coarser = vec4f(0.0);
@@ -205,5 +205,5 @@ fn fs_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
         discard;
     }
     let e = textureLoad(here_light, pixel, 0).rgb;
-    return scattered(gathered(pixel, e, shape), e, share);
+    return scattered(pixel, gathered(pixel, e, shape), e, share);
 }

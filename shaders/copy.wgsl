@@ -1,6 +1,8 @@
-// What the frame was, for all that does not scatter.
+// What the frame was, for all that does not scatter. Follows surface.wgsl.
 
 @group(0) @binding(4) var irradiance: texture_2d<f32>;
+// What multiplies what is added to a target.
+@group(0) @binding(5) var albedo: texture_2d<f32>;
 
 @vertex
 fn vs_frame(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
@@ -10,5 +12,9 @@ fn vs_frame(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
 
 @fragment
 fn fs_copy(@builtin(position) at: vec4f) -> @location(0) vec4f {
-    return textureLoad(irradiance, vec2i(at.xy), 0);
+    let e = textureLoad(irradiance, vec2i(at.xy), 0);
+    if view.has_albedo == 0u {
+        return e;
+    }
+    return vec4f(e.rgb * textureLoad(albedo, vec2i(at.xy), 0).rgb, e.a);
 }

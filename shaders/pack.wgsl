@@ -3,8 +3,6 @@
 @group(0) @binding(4) var irradiance: texture_2d<f32>;
 @group(0) @binding(5) var depth: texture_2d<f32>;
 @group(0) @binding(6) var profile_id: texture_2d<u32>;
-@group(0) @binding(13) var<uniform> normals: Normals;
-@group(0) @binding(14) var normal: texture_2d<f32>;
 // Of each tile, as in tiles.wgsl: a bit for each level at which it is not flat, from BENT_SHIFT on.
 @group(0) @binding(11) var<storage, read_write> marked: array<atomic<u32>>;
 
@@ -15,6 +13,11 @@ const FLAT_LEVELS = 3u;
 const BENT_SHIFT = 11u;
 // ∂z over the mm of a pixel that a surface may have.
 const STEEPEST = 40.0;
+
+// Whether light is a number. By its bits, since compilers may take for granted that it is.
+fn is_finite(light: vec3f) -> bool {
+    return all((bitcast<vec3u>(light) & vec3u(0x7f800000u)) != vec3u(0x7f800000u));
+}
 
 fn depth_at(pixel: vec2i) -> f32 {
     return textureLoad(depth, vec2i(view.first_pixel) + pixel, 0).r;
@@ -106,14 +109,6 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     var shape = Shape(id, z, vec2f(0.0));
     shape.tangent.x = tangent(pixel, vec2i(1, 0), vec2f(west, east), mm.x);
     shape.tangent.y = tangent(pixel, vec2i(0, 1), vec2f(north, south), mm.y);
-    if normals.has != 0u {
-        let texel = textureLoad(normal, pixel_of_host, 0).xyz;
-        let signed_mm = view.step.xy * z + view.step.zw;
-        let slope = slope_by_normal(normals, texel, ray(pixel).xy, signed_mm);
-        if slope.is_known {
-            shape.tangent = slope.dz / mm;
-        }
-    }
     let plane = plane_of(pixel, shape);
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
     let sines = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);

@@ -99,7 +99,7 @@ fn gathered(pixel: vec2i, e: vec4f, tile: Corner) -> Gathered {
         pair(pixel, 2 * u + 2 * v, tile.k22.rgb);
         pair(pixel, 2 * u - 2 * v, tile.k2n.rgb);
     }
-    let blurred = wanted * light / max(mass, vec3f(1e-20));
+    let blurred = blurred_by(light, mass, wanted, e.rgb);
     let rest = vec3f(tile.k00.a, tile.k10.a, tile.k01.a);
     // The texture may be larger than the level.
     let uv = (vec2f(pixel) + 0.5) / (2.0 * vec2f(textureDimensions(coarser_mean)));
@@ -121,5 +121,5 @@ fn fs_frame(tile: Corner) -> @location(0) vec4f {
         discard;
     }
     let e = textureLoad(here_light, pixel, 0);
-    return scattered(gathered(pixel, e, tile), e.rgb, share);
+    return scattered(pixel, gathered(pixel, e, tile), e.rgb, share);
 }

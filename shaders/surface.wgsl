@@ -11,6 +11,7 @@ struct View {
     has_strength: u32,
     // The depth at which there is no surface.
     far: f32,
+    has_albedo: u32,
     // p.xy = (u + ∂u·at)·z + (v + ∂v·at) for the pixel at `at`: x and y of u and v, then of ∂u and ∂v.
     origin: vec4f,
     step: vec4f,

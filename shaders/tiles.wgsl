@@ -6,6 +6,7 @@ struct View {
     has_id: u32,
     has_strength: u32,
     far: f32,
+    has_albedo: u32,
     origin: vec4f,
     step: vec4f,
     depth_to_mm: vec4f,

@@ -1,39 +1,54 @@
 //! Subsurface scattering of skin as a post-process for wgpu renderers, after Li & Shao 2015.
 //!
-//! A deferred renderer hands its lit diffuse irradiance and its depth to [`ScreenSpace`] and gets
-//! the scattered irradiance back, to be multiplied by albedo. [`TextureSpace`] does the same over
-//! an atlas of a mesh, the way of the paper; it is the reference that the screen is compared with.
-//! Both blur by a [`Profile`], a sum of Gaussians with variances in mm².
+//! A deferred renderer hands over the diffuse light on its surfaces and their depth, and gets that light
+//! back as skin spreads it:
 //!
-//! Features: `json` reads profiles from files; `physics` makes them from layers, pigments and scattering
-//! coefficients; `renderer` is a small deferred renderer that plays
-//! the host in the examples and tests; `truth` sums the integrals that all is measured against.
+//! ```text
+//! G-buffer → diffuse light E → [ subsurface ] → × albedo → + specular → transparency → TAA → tone mapping
+//! ```
+//!
+//! # One frame
+//! 1. A [`Plan`] says what is done: which blurs keep a stated error for a set of [`Profile`]s, sums of
+//!    Gaussians with variances in mm². [`Plan::skin`] is there at once; [`Plan::exact`] is the sum itself.
+//! 2. A [`ScreenSpace`] is that plan on a device: pipelines, made once and shared by all cameras.
+//! 3. A [`View`] is what one camera needs: scratch textures. Each frame [`View::prepare`] checks a [`Frame`]
+//!    and uploads a few hundred bytes; [`View::render`] records the passes. Nothing is submitted, and no
+//!    pipeline is made.
+//!
+//! [`TextureSpace`] scatters over an atlas of a mesh, the way of the paper: the reference that the screen
+//! is compared with.
+//!
+//! # Conventions
+//! Light is linear. Lengths are millimetres; [`Frame::mm_per_unit`] says how many a scene unit has. Matrices
+//! are column by column, view space is right-handed, depth runs from 0 to 1 in any direction. Errors are in
+//! units of white: of the radiance that the host shows as 1. Every input is checked before the device sees
+//! it, and what does not fit is an [`Error`] that names it.
+//!
+//! Features of the device: none, and no more than WebGPU's default limits. Feature `json` of the crate:
+//! profiles and plans as JSON, and serde's traits for them. Feature `physics`: profiles from layers, pigments
+//! and scattering coefficients.
 
 mod error;
+mod exact;
 mod frame;
-mod gaussian_sum;
-mod input;
+mod gpu;
+mod optics;
 #[cfg(feature = "physics")]
 pub mod physics;
 mod plan;
-mod planned;
 mod profile;
 mod pyramid;
-#[cfg(feature = "renderer")]
-pub mod renderer;
 mod screen_space;
 mod texture_space;
-#[cfg(feature = "truth")]
-pub mod truth;
+mod validate;
 #[cfg(test)]
 mod wgsl;
 
 pub use error::Error;
-pub use frame::{Normals, Output, ScreenFrame, Viewport};
+pub use frame::{Frame, Output, Viewport};
 pub use plan::{DEFAULT_MAX_ERROR, Plan, Row};
-pub use planned::PlannedScreenSpace;
 pub use profile::{Gaussian, Profile};
-pub use screen_space::ScreenSpace;
+pub use screen_space::{ScreenSpace, View};
 pub use texture_space::{Atlas, TextureSpace};
 pub use wgpu;
 

@@ -1,18 +1,18 @@
 //! Diffusion profiles: how far light travels under the surface, per colour.
 
-use glam::Vec3;
-
 use crate::Error;
 
 /// One term wᵢ·G(vᵢ, r) of a profile, with G(v, r) = exp(−r²/2v)/(2πv).
 ///
 /// Li & Shao 2015 print Eq. 10 without the 1/v; their Eq. 12 needs it (docs/method.md).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "json", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "json", serde(deny_unknown_fields))]
 pub struct Gaussian {
     /// Variance vᵢ along one axis, in mm². Zero leaves light where it fell.
     pub variance_mm2: f32,
     /// Weight wᵢ of the linear red, green and blue light, each at least 0.
-    pub weight: Vec3,
+    pub weight: [f32; 3],
 }
 
 /// A diffusion profile R(r) = Σ wᵢ·G(vᵢ, r) (Li & Shao 2015, Eq. 9) of 1 to 8 Gaussians.
@@ -20,12 +20,14 @@ pub struct Gaussian {
 /// The weights of each colour sum to 1, so that scattering neither adds nor takes energy; what
 /// the skin absorbs is the business of the albedo.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "json", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "json", serde(try_from = "Terms", into = "Terms"))]
 pub struct Profile {
     gaussians: [Gaussian; Self::MAX_GAUSSIANS],
     len: usize,
 }
 
-/// As in shaders/gaussian_sum.wgsl.
+/// As in shaders/exact/gaussian_sum.wgsl.
 const REACH_SIGMAS: f32 = 3.5;
 
 const NONE: Gaussian = gaussian(0.0, 0.0, 0.0, 0.0);
@@ -33,7 +35,7 @@ const NONE: Gaussian = gaussian(0.0, 0.0, 0.0, 0.0);
 const fn gaussian(variance_mm2: f32, red: f32, green: f32, blue: f32) -> Gaussian {
     Gaussian {
         variance_mm2,
-        weight: Vec3::new(red, green, blue),
+        weight: [red, green, blue],
     }
 }
 
@@ -64,36 +66,36 @@ impl Profile {
     /// colour whose weights sum to nothing.
     pub fn new(gaussians: &[Gaussian]) -> Result<Self, Error> {
         if gaussians.is_empty() || gaussians.len() > Self::MAX_GAUSSIANS {
-            return Err(Error::new(
-                "profile",
-                format!("{} Gaussians", gaussians.len()),
-                format!("1 to {}", Self::MAX_GAUSSIANS),
-            ));
+            return Err(Error::Count {
+                input: "profile: Gaussians",
+                got: gaussians.len(),
+                needs: [1, Self::MAX_GAUSSIANS],
+            });
         }
+        let refuse = |input: String, got: f32, needs| {
+            Err(Error::Number {
+                input,
+                got: got.into(),
+                needs,
+            })
+        };
+        let is_valid = |x: f32| x.is_finite() && x >= 0.0;
         for (i, g) in gaussians.iter().enumerate() {
-            if !g.variance_mm2.is_finite() || g.variance_mm2 < 0.0 {
-                return Err(Error::new(
-                    format!("profile: variance_mm2 of Gaussian {i}"),
-                    g.variance_mm2.to_string(),
-                    "a finite number of mm², at least 0",
-                ));
+            if !is_valid(g.variance_mm2) {
+                let input = format!("profile: variance_mm2 of Gaussian {i}");
+                return refuse(input, g.variance_mm2, "a finite number of mm², at least 0");
             }
-            if !g.weight.is_finite() || g.weight.min_element() < 0.0 {
-                return Err(Error::new(
-                    format!("profile: weight of Gaussian {i}"),
-                    g.weight.to_string(),
-                    "three finite numbers, each at least 0",
-                ));
+            if let Some(weight) = g.weight.into_iter().find(|w| !is_valid(*w)) {
+                let input = format!("profile: weight of Gaussian {i}");
+                return refuse(input, weight, "three finite numbers, each at least 0");
             }
         }
-        let sum: Vec3 = gaussians.iter().map(|g| g.weight).sum();
+        let sum = [0, 1, 2].map(|c| gaussians.iter().map(|g| g.weight[c]).sum::<f32>());
         // Below the least normal number the division would overflow.
-        if !sum.is_finite() || sum.min_element() < f32::MIN_POSITIVE {
-            return Err(Error::new(
-                "profile: sum of the weights",
-                sum.to_string(),
-                "a finite sum above 0 in every colour",
-            ));
+        let is_sum = |sum: f32| sum.is_finite() && sum >= f32::MIN_POSITIVE;
+        if let Some(sum) = sum.into_iter().find(|s| !is_sum(*s)) {
+            let needs = "a finite sum above 0 in every colour";
+            return refuse("profile: sum of the weights".into(), sum, needs);
         }
         let mut profile = Self {
             gaussians: [NONE; Self::MAX_GAUSSIANS],
@@ -102,7 +104,7 @@ impl Profile {
         for (to, from) in profile.gaussians.iter_mut().zip(gaussians) {
             *to = Gaussian {
                 variance_mm2: from.variance_mm2,
-                weight: from.weight / sum,
+                weight: [0, 1, 2].map(|c| from.weight[c] / sum[c]),
             };
         }
         Ok(profile)
@@ -115,33 +117,12 @@ impl Profile {
     /// Text that is not of this form, and all that [`Profile::new`] refuses.
     #[cfg(feature = "json")]
     pub fn from_json(text: &str) -> Result<Self, Error> {
-        #[derive(serde::Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct File {
-            gaussians: Vec<Term>,
-        }
-        #[derive(serde::Deserialize)]
-        #[serde(deny_unknown_fields)]
-        struct Term {
-            variance_mm2: f32,
-            weight: [f32; 3],
-        }
-        let file: File = serde_json::from_str(text).map_err(|e| {
-            Error::new(
-                "profile",
-                e.to_string(),
-                r#"{"gaussians": [{"variance_mm2": v, "weight": [r, g, b]}, …]}"#,
-            )
+        let terms: Terms = serde_json::from_str(text).map_err(|e| Error::Json {
+            input: "profile",
+            got: e.to_string(),
+            needs: r#"{"gaussians": [{"variance_mm2": v, "weight": [r, g, b]}, …]}"#,
         })?;
-        let gaussians: Vec<_> = file
-            .gaussians
-            .iter()
-            .map(|t| Gaussian {
-                variance_mm2: t.variance_mm2,
-                weight: t.weight.into(),
-            })
-            .collect();
-        Self::new(&gaussians)
+        terms.try_into()
     }
 
     /// How far, in mm, the effects carry light: 3.5 σ of the widest Gaussian. Skin that is nearer than this
@@ -157,6 +138,32 @@ impl Profile {
     }
 }
 
+/// A profile as it is written.
+#[cfg(feature = "json")]
+#[derive(serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Terms {
+    gaussians: Vec<Gaussian>,
+}
+
+#[cfg(feature = "json")]
+impl TryFrom<Terms> for Profile {
+    type Error = Error;
+
+    fn try_from(terms: Terms) -> Result<Self, Error> {
+        Self::new(&terms.gaussians)
+    }
+}
+
+#[cfg(feature = "json")]
+impl From<Profile> for Terms {
+    fn from(profile: Profile) -> Self {
+        Self {
+            gaussians: profile.gaussians().to_vec(),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -164,36 +171,39 @@ mod tests {
     fn gaussian(variance_mm2: f32, weight: f32) -> Gaussian {
         Gaussian {
             variance_mm2,
-            weight: Vec3::splat(weight),
+            weight: [weight; 3],
         }
     }
 
     #[test]
     fn skin_keeps_energy() {
-        let sum: Vec3 = Profile::SKIN.gaussians().iter().map(|g| g.weight).sum();
-        // Three printed decimals, six terms.
-        assert!((sum - Vec3::ONE).abs().max_element() < 1e-6, "{sum}");
+        for c in 0..3 {
+            let sum: f32 = Profile::SKIN.gaussians().iter().map(|g| g.weight[c]).sum();
+            // Three printed decimals, six terms.
+            assert!((sum - 1.0).abs() < 1e-6, "{sum}");
+        }
         assert_eq!(Profile::new(Profile::SKIN.gaussians()), Ok(Profile::SKIN));
     }
 
     #[test]
     fn skin_reaches_as_far_as_its_taps() {
         assert!((Profile::SKIN.reach_mm() - 9.53).abs() < 0.01);
-        let taps = format!("const REACH_SIGMAS = {REACH_SIGMAS:?};");
-        assert!(include_str!("../shaders/gaussian_sum.wgsl").contains(&taps));
+        let shader = crate::exact::gaussian_sum::SHADER;
+        let sigmas = crate::wgsl::constant(shader, "REACH_SIGMAS");
+        assert_eq!(sigmas, f64::from(REACH_SIGMAS));
     }
 
     #[test]
     fn weights_are_scaled_to_one() {
         let profile = Profile::new(&[gaussian(1.0, 3.0), gaussian(2.0, 1.0)]).unwrap();
-        assert_eq!(profile.gaussians()[0].weight, Vec3::splat(0.75));
+        assert_eq!(profile.gaussians()[0].weight, [0.75; 3]);
     }
 
     #[test]
     fn refuses_what_cannot_scatter() {
         for (bad, says) in [
-            (vec![], "0 Gaussians"),
-            (vec![gaussian(1.0, 1.0); 9], "9 Gaussians"),
+            (vec![], "got 0"),
+            (vec![gaussian(1.0, 1.0); 9], "got 9"),
             (vec![gaussian(-1.0, 1.0)], "-1"),
             (vec![gaussian(f32::NAN, 1.0)], "NaN"),
             (vec![gaussian(1.0, f32::INFINITY)], "inf"),
@@ -213,7 +223,17 @@ mod tests {
         let profile = Profile::from_json(text).unwrap();
         assert_eq!(profile.gaussians(), [gaussian(0.5, 1.0)]);
         for bad in ["", "[]", r#"{"gaussians": [{"variance": 1}]}"#, &text[..20]] {
-            assert_eq!(Profile::from_json(bad).unwrap_err().input, "profile");
+            let error = Profile::from_json(bad).unwrap_err();
+            assert!(
+                matches!(
+                    error,
+                    Error::Json {
+                        input: "profile",
+                        ..
+                    }
+                ),
+                "{error}"
+            );
         }
     }
 }

@@ -1,197 +1,198 @@
-//! Scattering in screen space: a post-process over a host's G-buffer. Driver of
-//! `shaders/screen_space.wgsl`.
+//! Scattering in screen space: the effect, which holds a plan's pipelines, and a view of it, which holds
+//! what one camera needs.
 
-use bytemuck::{Pod, Zeroable};
-use glam::{Mat4, UVec2, Vec2};
-use wgpu::{CommandEncoder, Device, TextureFormat, TextureView};
+use std::sync::Arc;
 
-use crate::frame::{NormalSettings, Optics};
-use crate::gaussian_sum::{self, GaussianSum, Inputs};
-use crate::{Error, Output, ScreenFrame, input};
+use wgpu::{CommandEncoder, Device, QuerySet, Queue, TextureView};
 
-/// Exact scattering in screen space: each Gaussian of the profile in two passes, by the distances
-/// between the surface points that the pixels show.
+use crate::exact::{self, Exact, ExactView};
+use crate::gpu::Recorder;
+use crate::optics::Optics;
+use crate::pyramid::{Pyramid, PyramidView};
+use crate::{Error, Frame, Output, Plan, validate};
+
+/// Scattering as a post-process: a [`Plan`] made ready for a device and an [`Output`].
 ///
-/// It borrows what the host owns and never submits. Each frame, [`prepare`](Self::prepare) checks
-/// and uploads, then [`render`](Self::render) records. A change of size is a changed input; to
-/// switch it off, don't call it.
-///
-/// Scratch memory: 80 bytes a pixel.
+/// [`new`](Self::new) makes all pipelines, so call it where you load, on any thread. A clone shares them.
+/// Nothing that follows makes another: not a change of size, of the plan or of the camera. One effect
+/// serves any number of [`View`]s.
+#[derive(Clone, Debug)]
 pub struct ScreenSpace {
-    output: Output,
-    layout: wgpu::BindGroupLayout,
-    pipeline: wgpu::RenderPipeline,
-    /// Bound where a frame has no ids.
-    no_id: TextureView,
-    positions: Option<TextureView>,
-    group: Option<wgpu::BindGroup>,
-    sum: GaussianSum,
+    shared: Arc<Shared>,
 }
 
-/// `Settings` of the shader.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Settings {
-    inverse_projection: Mat4,
-    first_pixel: UVec2,
-    size: Vec2,
-    far: f32,
-    has_id: u32,
-    pad: [u32; 2],
+#[derive(Debug)]
+struct Shared {
+    output: Output,
+    plan: Plan,
+    passes: Passes,
+}
+
+#[derive(Debug)]
+enum Passes {
+    Pyramid(Pyramid),
+    Exact(Exact),
 }
 
 impl ScreenSpace {
-    /// The effect that writes this output: a format such as Rgba16Float, or an [`Output`].
+    /// The effect that scatters by `plan` and writes `output`: a texture format such as Rgba16Float, or an
+    /// [`Output`].
     ///
     /// # Errors
-    /// A format that cannot be rendered to, or blended, on this device.
-    pub fn new(device: &Device, output: impl Into<Output>) -> Result<Self, Error> {
+    /// A format that cannot be rendered to, or blended, on this device; a device that allows less than
+    /// WebGPU's default limits.
+    pub fn new(device: &Device, output: impl Into<Output>, plan: &Plan) -> Result<Self, Error> {
         let output = output.into();
-        input::check_output(device, output)?;
-        let label = "subsurface::ScreenSpace positions";
-        let shader =
-            device.create_shader_module(wgpu::include_wgsl!("../shaders/screen_space.wgsl"));
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some(label),
-            entries: &[
-                gaussian_sum::UNIFORM,
-                gaussian_sum::float_texture(1),
-                gaussian_sum::uint_texture(2),
-            ],
-        });
+        validate::output(device, output)?;
+        let passes = match plan.weights() {
+            Some(weights) => Passes::Pyramid(Pyramid::new(device, output, weights)?),
+            None => Passes::Exact(Exact::new(device, output)),
+        };
         Ok(Self {
-            output,
-            pipeline: gaussian_sum::full_screen(
-                device,
-                &shader,
-                label,
-                "fs_positions",
-                &layout,
-                gaussian_sum::SCRATCH.into(),
-            ),
-            layout,
-            no_id: gaussian_sum::scratch_view(device, label, [1, 1], TextureFormat::R8Uint),
-            positions: None,
-            group: None,
-            sum: GaussianSum::new(device, output, "subsurface::ScreenSpace"),
+            shared: Arc::new(Shared {
+                output,
+                plan: plan.clone(),
+                passes,
+            }),
         })
     }
 
-    /// Checks the inputs of a frame and uploads what the shaders need; scratch textures are made
-    /// anew when the size has changed.
-    ///
-    /// # Errors
-    /// The first input that does not fit; the frame prepared before stays in place.
-    pub fn prepare(&mut self, device: &Device, frame: &ScreenFrame) -> Result<(), Error> {
-        frame.check(self.output)?;
-        let optics = Optics::new(frame)?;
-        let viewport = frame.viewport();
-        let size = viewport.size();
-        let settings = gaussian_sum::uniform(
-            device,
-            "subsurface::ScreenSpace positions",
-            &Settings {
-                inverse_projection: optics.inverse_projection,
-                first_pixel: viewport.first(),
-                size: UVec2::from(size).as_vec2(),
-                far: optics.far,
-                has_id: u32::from(frame.profile_id.is_some()),
-                pad: [0; 2],
-            },
-        );
-        let positions = match self.positions.take() {
-            Some(view) if input::size(&view) == size => view,
-            _ => gaussian_sum::scratch_view(
-                device,
-                "subsurface::ScreenSpace positions",
-                size,
-                gaussian_sum::SCRATCH,
-            ),
-        };
-        self.group = Some(device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("subsurface::ScreenSpace positions"),
-            layout: &self.layout,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: settings.as_entire_binding(),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::TextureView(frame.depth),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 2,
-                    resource: wgpu::BindingResource::TextureView(
-                        frame.profile_id.unwrap_or(&self.no_id),
-                    ),
-                },
-            ],
-        }));
-        self.sum.prepare(
-            device,
-            &Inputs {
-                positions: &positions,
-                irradiance: frame.irradiance,
-                output: frame.output,
-                strength: frame.strength,
-                normal: frame.normal.map(|n| n.texture),
-                viewport: frame.viewport,
-                profiles: frame.profiles,
-                settings: gaussian_sum::Settings {
-                    spacing: optics.spacing(),
-                    rays: optics.rays(),
-                    normals: NormalSettings::new(frame.normal),
-                    first_pixel: viewport.first(),
-                    has_strength: u32::from(frame.strength.is_some()),
-                    ..gaussian_sum::Settings::new(frame.profiles, 1.0)
-                },
-            },
-        );
-        self.positions = Some(positions);
-        Ok(())
+    /// The plan that it was made for.
+    pub fn plan(&self) -> &Plan {
+        &self.shared.plan
     }
 
-    /// Records the frame that was last prepared; nothing before the first.
-    pub fn render(&self, encoder: &mut CommandEncoder) {
-        self.render_by_pass(encoder, |_, _| ());
+    /// The output that it was made for.
+    pub fn output(&self) -> Output {
+        self.shared.output
     }
 
-    /// Records as [`render`](Self::render), and calls `after` with the label of each pass once that is
-    /// recorded. There, timestamps can be written; or what is recorded so far submitted, with a new encoder
-    /// in the place of the old one.
-    pub fn render_by_pass(
-        &self,
-        encoder: &mut CommandEncoder,
-        mut after: impl FnMut(&str, &mut CommandEncoder),
-    ) {
-        if let (Some(positions), Some(group)) = (&self.positions, &self.group) {
-            let label = "subsurface::ScreenSpace positions";
-            let pipeline = &self.pipeline;
-            gaussian_sum::draw_full_screen(encoder, label, pipeline, group, positions, 0);
-            after(label, encoder);
-            self.sum.render(encoder, &mut after);
+    /// Bytes of scratch memory on the device that a [`View`] of a frame, or viewport, of `size` pixels takes.
+    pub fn scratch_bytes(&self, size: [u32; 2]) -> u64 {
+        match &self.shared.passes {
+            Passes::Pyramid(pyramid) => pyramid.scratch_bytes(size),
+            Passes::Exact(_) => exact::BYTES_PER_PIXEL * u64::from(size[0]) * u64::from(size[1]),
         }
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::wgsl::assert_layout;
+/// What one camera needs to scatter its frames: scratch textures, and the numbers of its last frame.
+///
+/// Two calls a frame. [`prepare`](Self::prepare) checks the inputs and uploads; [`render`](Self::render)
+/// records. Views that share a submission must be views of their own, since the numbers of a frame are
+/// uploaded when it is prepared. A view may change its effect from frame to frame, to toggle plans; it keeps
+/// the scratch of a pyramid and that of the exact sum once it was prepared for each. Drop it to free them.
+#[derive(Debug, Default)]
+pub struct View {
+    pyramid: Option<PyramidView>,
+    exact: Option<ExactView>,
+    prepared: Option<Prepared>,
+}
 
-    #[test]
-    fn settings_lie_as_the_shader_has_them() {
-        assert_layout!(
-            include_str!("../shaders/screen_space.wgsl"),
-            "Settings",
-            Settings {
-                inverse_projection,
-                first_pixel,
-                size,
-                far,
-                has_id
+/// The frame that was last prepared.
+#[derive(Debug)]
+struct Prepared {
+    effect: ScreenSpace,
+    size: [u32; 2],
+    read: Vec<(&'static str, TextureView)>,
+}
+
+impl View {
+    /// The most passes that a frame records: twice as many queries are enough for
+    /// [`render_timed`](Self::render_timed).
+    pub const MAX_PASSES: u32 = 64;
+
+    /// A view that was not prepared yet. It takes no memory on the device.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Checks a frame and uploads what the shaders need. Scratch textures are made anew when the size of
+    /// the frame, or of its viewport, has changed. Views of the host's textures are kept until the next
+    /// call.
+    ///
+    /// # Errors
+    /// The first input that does not fit. The frame prepared before then stays in place.
+    pub fn prepare(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        effect: &ScreenSpace,
+        frame: &Frame,
+    ) -> Result<(), Error> {
+        let Shared {
+            output,
+            plan,
+            passes,
+        } = &*effect.shared;
+        validate::frame(frame, *output)?;
+        let optics = Optics::new(frame)?;
+        match passes {
+            Passes::Pyramid(pyramid) => {
+                Optics::check_depth_alone(frame)?;
+                pyramid.prepare(device, queue, &mut self.pyramid, frame, &optics);
             }
-        );
+            Passes::Exact(exact) => {
+                let profiles = plan.profiles();
+                exact.prepare(device, queue, &mut self.exact, frame, &optics, profiles);
+            }
+        }
+        let read = frame.textures().map(|(name, view)| (name, view.clone()));
+        self.prepared = Some(Prepared {
+            effect: effect.clone(),
+            size: frame.size(),
+            read: read.collect(),
+        });
+        Ok(())
+    }
+
+    /// Records the frame that was last prepared. The result goes to `output`, a texture of the format that
+    /// the effect was made for and of the frame's size, with the usage `RENDER_ATTACHMENT`; [`Output`] says
+    /// what is written there.
+    ///
+    /// # Errors
+    /// An output that does not fit; a call before the first [`prepare`](Self::prepare). Nothing is recorded
+    /// then.
+    pub fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
+        self.record(encoder, output, None).map(|_| ())
+    }
+
+    /// Records as [`render`](Self::render), and has the device write the time before and after pass *i* to
+    /// the queries `first_query` + 2*i* and + 2*i* + 1. Needs the feature `TIMESTAMP_QUERY`. Returns the
+    /// labels of the passes, at most [`MAX_PASSES`](Self::MAX_PASSES).
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    pub fn render_timed(
+        &self,
+        encoder: &mut CommandEncoder,
+        output: &TextureView,
+        queries: &QuerySet,
+        first_query: u32,
+    ) -> Result<Vec<String>, Error> {
+        self.record(encoder, output, Some((queries, first_query)))
+    }
+
+    fn record(
+        &self,
+        encoder: &mut CommandEncoder,
+        output: &TextureView,
+        times: Option<(&QuerySet, u32)>,
+    ) -> Result<Vec<String>, Error> {
+        let Prepared { effect, size, read } = self.prepared.as_ref().ok_or(Error::NotPrepared)?;
+        let inputs = read.iter().map(|(name, view)| (*name, view));
+        validate::target(output, effect.output(), *size, inputs)?;
+        encoder.push_debug_group("subsurface::View");
+        let mut recorder = Recorder::new(encoder, times);
+        match (&effect.shared.passes, &self.pyramid, &self.exact) {
+            (Passes::Pyramid(pyramid), Some(view), _) => {
+                pyramid.render(&mut recorder, view, output);
+            }
+            (Passes::Exact(exact), _, Some(view)) => exact.render(&mut recorder, view, output),
+            _ => {}
+        }
+        let labels = recorder.finish();
+        encoder.pop_debug_group();
+        Ok(labels)
     }
 }

@@ -1,73 +1,41 @@
 //! What a host may ask for beyond a frame of its own: a part of a target, ids or none, less of the
 //! effect, sums in place; by both effects.
 
-mod common;
-
-use std::collections::BTreeSet;
 use std::sync::OnceLock;
 
-use common::{View, gpu, plane, sphere};
-use glam::{DMat4, DVec3, DVec4, Mat3, Mat4};
-use subsurface::truth::closed_form::step;
-use subsurface::wgpu::{CommandEncoder, TextureFormat, TextureView};
-use subsurface::{
-    Normals, Output, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace, Viewport,
-};
+use glam::{DMat4, DVec3, DVec4, Mat4};
+use subsurface::wgpu::{self, CommandEncoder, TextureFormat, TextureView};
+use subsurface::{Frame, Output, Plan, Profile, ScreenSpace, Viewport};
+use subsurface_lab::synthetic::{View, gpu, plane, sphere};
+use subsurface_lab::truth::closed_form::step;
 
 const SIZE: [u32; 2] = [96, 80];
 const HALF: TextureFormat = TextureFormat::Rgba16Float;
 
-/// A plan of skin.
-fn plan() -> &'static Plan {
-    static PLAN: OnceLock<Plan> = OnceLock::new();
-    PLAN.get_or_init(|| Plan::new(&[Profile::SKIN], 0.01).unwrap())
+/// A plan of skin, or the exact sum.
+fn plan(planned: bool) -> &'static Plan {
+    static PLANS: OnceLock<[Plan; 2]> = OnceLock::new();
+    let plans = PLANS.get_or_init(|| {
+        let skin = [Profile::SKIN];
+        [Plan::exact(&skin).unwrap(), Plan::new(&skin, 0.01).unwrap()]
+    });
+    &plans[usize::from(planned)]
 }
 
-/// Scatters a frame by the one effect or the other.
-fn record(planned: bool, output: Output, frame: &ScreenFrame, encoder: &mut CommandEncoder) {
-    let gpu = gpu();
-    if planned {
-        let mut effect = PlannedScreenSpace::new(&gpu.device, output).unwrap();
-        let prepared = effect.prepare(&gpu.device, &gpu.queue, frame, plan());
-        prepared.unwrap();
-        effect.render(encoder);
-    } else {
-        let mut effect = ScreenSpace::new(&gpu.device, output).unwrap();
-        effect.prepare(&gpu.device, frame).unwrap();
-        effect.render(encoder);
-    }
-}
-
-/// Submits each pass of an effect on its own, and leaves nothing to be submitted.
-fn record_pass_by_pass(
+/// Scatters a frame by a new effect and a new view.
+fn record(
     planned: bool,
-    output: Output,
-    frame: &ScreenFrame,
+    to: Output,
+    frame: &Frame,
+    output: &TextureView,
     encoder: &mut CommandEncoder,
 ) {
     let gpu = gpu();
-    let mut labels = Vec::new();
-    let after = |label: &str, encoder: &mut CommandEncoder| {
-        labels.push(label.to_owned());
-        let next = gpu.device.create_command_encoder(&Default::default());
-        gpu.queue
-            .submit([std::mem::replace(encoder, next).finish()]);
-    };
-    if planned {
-        let mut effect = PlannedScreenSpace::new(&gpu.device, output).unwrap();
-        let prepared = effect.prepare(&gpu.device, &gpu.queue, frame, plan());
-        prepared.unwrap();
-        effect.render_by_pass(encoder, after);
-        // Seven levels are halved to, and blurred; the frame is blurred, too.
-        assert_eq!(labels.len(), 3 + 2 * 7 + 1);
-    } else {
-        let mut effect = ScreenSpace::new(&gpu.device, output).unwrap();
-        effect.prepare(&gpu.device, frame).unwrap();
-        effect.render_by_pass(encoder, after);
-        assert_eq!(labels.len(), 2 + 2 * Profile::SKIN.gaussians().len() + 1);
-    }
-    let distinct: BTreeSet<_> = labels.iter().collect();
-    assert_eq!(distinct.len(), labels.len());
+    let effect = ScreenSpace::new(&gpu.device, to, plan(planned)).unwrap();
+    let mut view = subsurface::View::new();
+    let prepared = view.prepare(&gpu.device, &gpu.queue, &effect, frame);
+    prepared.unwrap();
+    view.render(encoder, output).unwrap();
 }
 
 /// A sphere before nothing, in half floats.
@@ -83,8 +51,8 @@ struct Scene {
 #[derive(Default)]
 struct Asked<'a> {
     no_ids: bool,
-    pass_by_pass: bool,
     strength: Option<&'a TextureView>,
+    albedo: Option<&'a TextureView>,
     viewport: Option<Viewport>,
 }
 
@@ -171,27 +139,16 @@ impl Scene {
         });
         let ids =
             (!asked.no_ids).then(|| gpu.upload("id", self.size, TextureFormat::R8Uint, &self.id));
-        let frame = ScreenFrame {
-            irradiance: &gpu.upload(
-                "irradiance",
-                self.size,
-                TextureFormat::Rgba32Float,
-                &self.irradiance,
-            ),
-            depth: &gpu.upload("depth", self.size, TextureFormat::R32Float, &self.depth),
-            profile_id: ids.as_ref(),
-            normal: None,
-            strength: asked.strength,
-            viewport: asked.viewport,
-            output: &to,
-            projection: self.projection,
-            mm_per_unit: 1.0,
-            profiles: &[Profile::SKIN],
-        };
-        gpu.run(|encoder| match asked.pass_by_pass {
-            false => record(planned, output, &frame, encoder),
-            true => record_pass_by_pass(planned, output, &frame, encoder),
-        });
+        let full = TextureFormat::Rgba32Float;
+        let irradiance = gpu.upload("irradiance", self.size, full, &self.irradiance);
+        let depth = gpu.upload("depth", self.size, TextureFormat::R32Float, &self.depth);
+        let mut frame = Frame::new(&irradiance, &depth, self.projection.to_cols_array_2d());
+        frame.profile_id = ids.as_ref();
+        frame.strength = asked.strength;
+        frame.albedo = asked.albedo;
+        frame.viewport = asked.viewport;
+        frame.mm_per_unit = 1.0;
+        gpu.run(|encoder| record(planned, output, &frame, &to, encoder));
         gpu.read(&to)
     }
 
@@ -266,83 +223,201 @@ fn one_effect_serves_frames_that_change() {
     let irradiance = gpu.upload("irradiance", more.size, HALF, &halves(&more.irradiance));
     let depth = gpu.upload("depth", more.size, TextureFormat::R32Float, &more.depth);
     let id = gpu.upload("id", more.size, TextureFormat::R8Uint, &more.id);
-    let first = ScreenFrame {
-        irradiance: &irradiance,
-        depth: &depth,
-        profile_id: Some(&id),
-        normal: None,
-        strength: None,
-        viewport: Some(PLACE),
-        output: &output,
-        projection: more.projection,
-        mm_per_unit: 1.0,
-        profiles: &[Profile::SKIN],
-    };
-    let moved = Viewport {
-        x: 0,
-        y: 3,
-        ..PLACE
+    let mut first = Frame::new(&irradiance, &depth, more.projection.to_cols_array_2d());
+    first.profile_id = Some(&id);
+    first.viewport = Some(PLACE);
+    first.mm_per_unit = 1.0;
+    let changed = |change: &dyn Fn(&mut Frame)| {
+        let mut frame = first;
+        change(&mut frame);
+        frame
     };
     let frames = [
         first,
-        ScreenFrame {
-            viewport: Some(moved),
-            ..first
-        },
-        ScreenFrame {
-            viewport: None,
-            ..first
-        },
-        ScreenFrame {
-            mm_per_unit: 3.0,
-            ..first
-        },
-        ScreenFrame {
-            profile_id: None,
-            ..first
-        },
+        changed(&|f| {
+            f.viewport = Some(Viewport {
+                x: 0,
+                y: 3,
+                ..PLACE
+            })
+        }),
+        changed(&|f| f.viewport = None),
+        changed(&|f| f.mm_per_unit = 3.0),
+        changed(&|f| f.profile_id = None),
         first,
     ];
-    let mut exact = ScreenSpace::new(&gpu.device, HALF).unwrap();
-    let mut planned = PlannedScreenSpace::new(&gpu.device, HALF).unwrap();
-    let seen = |effect: &mut dyn FnMut(&mut CommandEncoder)| {
+    let effects = [false, true].map(|p| ScreenSpace::new(&gpu.device, HALF, plan(p)).unwrap());
+    let mut view = subsurface::View::new();
+    let seen = |record: &mut dyn FnMut(&mut CommandEncoder)| {
         let nothing = vec![[0.0; 4]; more.depth.len()];
         let cleared = gpu.upload("cleared", more.size, HALF, &halves(&nothing));
         gpu.run(|encoder| {
             let [from, to] = [&cleared, &output].map(|view| view.texture().as_image_copy());
             encoder.copy_texture_to_texture(from, to, cleared.texture().size());
-            effect(encoder);
+            record(encoder);
         });
         gpu.read(&output)
     };
     for (i, frame) in frames.iter().enumerate() {
-        for by_plan in [false, true] {
-            let anew = seen(&mut |encoder| record(by_plan, HALF.into(), frame, encoder));
+        // One view for both effects, which keep their scratch side by side.
+        for (effect, by_plan) in effects.iter().zip([false, true]) {
+            let anew = seen(&mut |encoder| record(by_plan, HALF.into(), frame, &output, encoder));
             let kept = seen(&mut |encoder| {
-                if by_plan {
-                    let prepared = planned.prepare(&gpu.device, &gpu.queue, frame, plan());
-                    prepared.unwrap();
-                    planned.render(encoder);
-                } else {
-                    exact.prepare(&gpu.device, frame).unwrap();
-                    exact.render(encoder);
-                }
+                let prepared = view.prepare(&gpu.device, &gpu.queue, effect, frame);
+                prepared.unwrap();
+                view.render(encoder, &output).unwrap();
             });
             assert_eq!(kept, anew, "frame {i}, planned: {by_plan}");
         }
     }
 }
 
+/// Two plans, two sizes and two views by turns. Scratch textures follow the sizes.
 #[test]
-fn passes_may_be_submitted_one_by_one() {
+fn no_pipeline_is_made_from_frame_to_frame() {
+    let gpu = gpu();
+    let scenes = [Scene::new(), Scene::new().within_more()];
+    let upload = |scene: &Scene| {
+        let size = scene.size;
+        [
+            gpu.upload("irradiance", size, HALF, &halves(&scene.irradiance)),
+            gpu.upload("depth", size, TextureFormat::R32Float, &scene.depth),
+            gpu.upload("id", size, TextureFormat::R8Uint, &scene.id),
+        ]
+    };
+    let textures = scenes.each_ref().map(upload);
+    let frame = |i: usize| {
+        let [irradiance, depth, id] = &textures[i];
+        let projection = scenes[i].projection.to_cols_array_2d();
+        let mut frame = Frame::new(irradiance, depth, projection);
+        frame.profile_id = Some(id);
+        frame.mm_per_unit = 1.0;
+        frame
+    };
+    let plans = [0.004, 0.01].map(|e| Plan::new(&[Profile::SKIN], e).unwrap());
+    let effects = plans.map(|plan| ScreenSpace::new(&gpu.device, HALF, &plan).unwrap());
+    let mut views = [(); 2].map(|()| subsurface::View::new());
+    let made = || {
+        let counters = gpu.device.get_internal_counters().hal;
+        let pipelines = counters.render_pipelines.read() + counters.compute_pipelines.read();
+        assert!(pipelines > 0, "the device counts");
+        [pipelines, counters.shader_modules.read()]
+    };
+    let mut before = Some(made());
+    for i in 0..1000 {
+        // Each view alternates between the plans, and both between the sizes.
+        let (effect, view) = (&effects[i % 2], &mut views[i / 2 % 2]);
+        let frame = frame(i / 4 % 2);
+        view.prepare(&gpu.device, &gpu.queue, effect, &frame)
+            .unwrap();
+        // What was dropped goes when the queue is next submitted and done.
+        if i % 100 == 0 {
+            gpu.run(|_| ());
+        }
+        let made = made();
+        assert_eq!(*before.get_or_insert(made), made, "frame {i}");
+    }
+}
+
+/// Two cameras in one submission give what each gives alone.
+#[test]
+fn views_share_a_submission() {
+    let gpu = gpu();
     let scene = Scene::new();
+    let size = scene.size;
+    let irradiance = gpu.upload("irradiance", size, HALF, &halves(&scene.irradiance));
+    let depth = gpu.upload("depth", size, TextureFormat::R32Float, &scene.depth);
+    let id = gpu.upload("id", size, TextureFormat::R8Uint, &scene.id);
+    let frame = |mm_per_unit| {
+        let mut frame = Frame::new(&irradiance, &depth, scene.projection.to_cols_array_2d());
+        frame.profile_id = Some(&id);
+        frame.mm_per_unit = mm_per_unit;
+        frame
+    };
     for planned in [false, true] {
-        let asked = Asked {
-            pass_by_pass: true,
-            ..Asked::default()
-        };
-        let at_once = scene.scattered(planned, Asked::default());
-        assert_eq!(scene.scattered(planned, asked), at_once);
+        let effect = ScreenSpace::new(&gpu.device, HALF, plan(planned)).unwrap();
+        let mut views = [(); 2].map(|()| subsurface::View::new());
+        let outputs = [(); 2].map(|()| gpu.target("output", size, HALF));
+        gpu.run(|encoder| {
+            for ((view, output), mm_per_unit) in views.iter_mut().zip(&outputs).zip([1.0, 3.0]) {
+                let frame = frame(mm_per_unit);
+                view.prepare(&gpu.device, &gpu.queue, &effect, &frame)
+                    .unwrap();
+                view.render(encoder, output).unwrap();
+            }
+        });
+        for (output, mm_per_unit) in outputs.iter().zip([1.0, 3.0]) {
+            let alone = gpu.target("alone", size, HALF);
+            let frame = frame(mm_per_unit);
+            gpu.run(|encoder| record(planned, HALF.into(), &frame, &alone, encoder));
+            assert_eq!(gpu.read(output), gpu.read(&alone), "planned: {planned}");
+        }
+    }
+}
+
+/// Times of passes, where the device takes them.
+#[test]
+fn passes_tell_their_times() {
+    let gpu = gpu();
+    if !gpu
+        .device
+        .features()
+        .contains(wgpu::Features::TIMESTAMP_QUERY)
+    {
+        println!("this device takes no times");
+        return;
+    }
+    let scene = Scene::new();
+    let size = scene.size;
+    let irradiance = gpu.upload("irradiance", size, HALF, &halves(&scene.irradiance));
+    let depth = gpu.upload("depth", size, TextureFormat::R32Float, &scene.depth);
+    let mut frame = Frame::new(&irradiance, &depth, scene.projection.to_cols_array_2d());
+    frame.mm_per_unit = 1.0;
+    let output = gpu.target("output", size, HALF);
+    let count = 2 * subsurface::View::MAX_PASSES;
+    let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+        label: None,
+        ty: wgpu::QueryType::Timestamp,
+        count,
+    });
+    let bytes = 8 * u64::from(count);
+    let buffer = |usage| {
+        gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: bytes,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    };
+    let resolved = buffer(wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC);
+    let read = buffer(wgpu::BufferUsages::MAP_READ);
+    for planned in [false, true] {
+        let effect = ScreenSpace::new(&gpu.device, HALF, plan(planned)).unwrap();
+        let mut view = subsurface::View::new();
+        view.prepare(&gpu.device, &gpu.queue, &effect, &frame)
+            .unwrap();
+        let labels = gpu.run(|encoder| {
+            let labels = view.render_timed(encoder, &output, &queries, 0).unwrap();
+            encoder.resolve_query_set(&queries, 0..2 * labels.len() as u32, &resolved, 0);
+            encoder.copy_buffer_to_buffer(&resolved, 0, &read, 0, bytes);
+            labels
+        });
+        assert!(labels.len() <= subsurface::View::MAX_PASSES as usize);
+        let distinct: std::collections::BTreeSet<_> = labels.iter().collect();
+        assert_eq!(distinct.len(), labels.len(), "{labels:?}");
+        read.map_async(wgpu::MapMode::Read, .., |result| result.unwrap());
+        gpu.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .unwrap();
+        let times: Vec<u64> = bytemuck::pod_collect_to_vec(&read.get_mapped_range(..).unwrap());
+        read.unmap();
+        for (label, pair) in labels.iter().zip(times.chunks(2)) {
+            assert!(pair[0] <= pair[1] && pair[0] > 0, "{label}: {pair:?}");
+        }
+        // The same as without times.
+        let without = gpu.target("output", size, HALF);
+        gpu.run(|encoder| record(planned, HALF.into(), &frame, &without, encoder));
+        assert_eq!(gpu.read(&output), gpu.read(&without));
     }
 }
 
@@ -505,68 +580,6 @@ fn light_beyond_half_floats_stays_a_number() {
 }
 
 #[test]
-fn normals_say_what_depth_says() {
-    let view = View::orthographic([112, 112], 4.0);
-    let light = DVec3::new(1.0, 0.0, 1.0).normalize();
-    let seen = view.shoot(sphere(10.0, 100.0, |n| DVec3::splat(n.dot(light).max(0.0))));
-    let asked: Vec<usize> = seen
-        .pixels(|h| h.normal.z > 0.35)
-        .iter()
-        .map(|(i, _)| *i)
-        .collect();
-    // A camera that looks elsewhere than along the world's axes.
-    let to_view = Mat3::from_rotation_y(0.7) * Mat3::from_rotation_x(-0.4);
-    let normals = |encode: &dyn Fn(glam::Vec3) -> glam::Vec3| -> Vec<[f32; 4]> {
-        let normal = |h: &Option<common::Hit>| h.map_or(glam::Vec3::ZERO, |h| h.normal.as_vec3());
-        let encoded = seen
-            .hits
-            .iter()
-            .map(|h| encode(normal(h)).extend(0.0).to_array());
-        encoded.collect()
-    };
-    let in_view = normals(&|n| n);
-    let in_world = normals(&|n| to_view.transpose() * n);
-    let none = normals(&|_| glam::Vec3::ZERO);
-    let full = TextureFormat::Rgba32Float;
-    for planned in [false, true] {
-        let scatter = |normals: Option<(&[[f32; 4]], Mat3)>| {
-            let texture =
-                normals.map(|(texels, _)| gpu().upload("normal", view.size, full, texels));
-            seen.render(&[Profile::SKIN], full, |frame, encoder| {
-                let normal = normals
-                    .zip(texture.as_ref())
-                    .map(|((_, to_view), texture)| Normals { texture, to_view });
-                let frame = ScreenFrame { normal, ..*frame };
-                record(planned, full.into(), &frame, encoder);
-            })
-        };
-        let by_depth = scatter(None);
-        let by_normals = scatter(Some((&in_view, Mat3::IDENTITY)));
-        assert_eq!(scatter(Some((&none, Mat3::IDENTITY))), by_depth);
-        let world = scatter(Some((&in_world, to_view)));
-        // A rotation there and back, in single floats; half floats between the passes of a plan.
-        assert!(largest_difference(&world, &by_normals) <= 0.001);
-        let red_rms = |out: &[[f32; 4]]| {
-            let out: Vec<DVec3> = out.iter().map(|p| DVec3::splat(p[0].into())).collect();
-            common::rms(seen.errors(&out, &asked).iter().map(|e| e.x))
-        };
-        // Other normals are other areas, and other light.
-        assert!(by_normals != by_depth);
-        let wrong = normals(&|n| glam::Vec3::new(n.z, n.x, n.y.abs() + 0.2));
-        let wrong = scatter(Some((&wrong, Mat3::IDENTITY)));
-        assert!(largest_difference(&wrong, &by_depth) > 0.02);
-        let [depth, normal] = [&by_depth, &by_normals].map(|out| red_rms(out));
-        println!(
-            "planned: {planned}, red RMS to the visible integral by depth {depth:.5}, by normals {normal:.5}"
-        );
-        // On this surface the exact effect was 1.09 times as far off by normals as by depth; a wrong sign or
-        // scale is many times. Plans store in half floats besides: a step of these below white.
-        let at_most = if planned { depth + 0.0005 } else { 1.1 * depth };
-        assert!(normal <= at_most, "{normal} by normals, {depth} by depth");
-    }
-}
-
-#[test]
 fn sums_in_place_are_what_a_final_pass_would_add() {
     let scene = Scene::new();
     let specular: Vec<[f32; 4]> = (0..scene.depth.len())
@@ -599,6 +612,36 @@ fn sums_in_place_are_what_a_final_pass_would_add() {
                 "planned: {planned}"
             );
         }
+    }
+}
+
+/// Paint that is handed in beside the light stays where it is.
+#[test]
+fn albedo_multiplies_what_is_added() {
+    let scene = Scene::new();
+    let paint: Vec<[f32; 4]> = (0..scene.depth.len())
+        .map(|i| [[0.75, 0.5, 0.25, 1.0], [0.25, 0.25, 0.5, 0.0]][i / 5 % 2])
+        .collect();
+    let albedo = gpu().upload("albedo", scene.size, HALF, &halves(&paint));
+    let times = |a: &[f32; 4], b: &[f32; 4]| [a[0] * b[0], a[1] * b[1], a[2] * b[2], 0.5];
+    for planned in [false, true] {
+        let asked = || Asked {
+            albedo: Some(&albedo),
+            ..Asked::default()
+        };
+        let scattered = scene.scattered(planned, Asked::default());
+        let painted = |light: &[[f32; 4]]| -> Vec<_> {
+            light.iter().zip(&paint).map(|(a, b)| times(a, b)).collect()
+        };
+        let wanted = painted(&scattered);
+        let nothing = vec![[0.0, 0.0, 0.0, 0.5]; paint.len()];
+        let lit = painted(&scene.irradiance);
+        let added = scene.scatter(planned, Output::AddScattered(HALF), &nothing, asked());
+        let changed = scene.scatter(planned, Output::AddDifference(HALF), &lit, asked());
+        // Up to three roundings of half floats, or truncations, of steps of .0005 below 1.
+        let worst = [&added, &changed].map(|out| largest_difference(out, &wanted));
+        println!("planned: {planned}, off by {worst:?}");
+        assert!(worst[0].max(worst[1]) <= 0.0015, "{worst:?}");
     }
 }
 
@@ -720,19 +763,13 @@ impl Camera {
         }
         let full = TextureFormat::Rgba32Float;
         let output = gpu.target("output", target, full);
-        let frame = ScreenFrame {
-            irradiance: &gpu.upload("irradiance", target, full, &irradiance),
-            depth: &gpu.upload("depth", target, TextureFormat::R32Float, &depth),
-            profile_id: None,
-            normal: None,
-            strength: None,
-            viewport: self.viewport,
-            output: &output,
-            projection: (self.projection * from_units).as_mat4(),
-            mm_per_unit: self.mm_per_unit as f32,
-            profiles: &[Profile::SKIN],
-        };
-        gpu.run(|encoder| record(planned, full.into(), &frame, encoder));
+        let irradiance = gpu.upload("irradiance", target, full, &irradiance);
+        let depth = gpu.upload("depth", target, TextureFormat::R32Float, &depth);
+        let projection = (self.projection * from_units).as_mat4().to_cols_array_2d();
+        let mut frame = Frame::new(&irradiance, &depth, projection);
+        frame.viewport = self.viewport;
+        frame.mm_per_unit = self.mm_per_unit as f32;
+        gpu.run(|encoder| record(planned, full.into(), &frame, &output, encoder));
         let out = gpu.read(&output);
         let moment = |f: &dyn Fn(f64) -> f64| -> f64 {
             let parts = places.iter().map(|(i, x)| f64::from(out[*i][0]) * f(*x));
@@ -756,7 +793,7 @@ fn a_line_has_its_width_in_mm_through_every_camera() {
         // Of the line, soft by .04 mm², and of red in the profile; the frame cuts some of it off, and a plan
         // has more far away, within its error.
         let skin = Profile::SKIN;
-        let of_red = |g: &subsurface::Gaussian| f64::from(g.weight.x * g.variance_mm2);
+        let of_red = |g: &subsurface::Gaussian| f64::from(g.weight[0] * g.variance_mm2);
         let red: f64 = skin.gaussians().iter().map(of_red).sum();
         let truth = (red + 1.0 / 12.0 + 0.04).sqrt();
         let most_off = if planned { 0.3 } else { 0.01 };

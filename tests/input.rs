@@ -1,112 +1,115 @@
 //! Inputs that do not fit are named, never a panic or a validation error of the device.
 
-mod common;
-
 use std::sync::OnceLock;
 
-use common::gpu;
-use glam::{Mat3, Mat4};
+use glam::Mat4;
 use subsurface::wgpu::{self, TextureFormat, TextureUsages, TextureView};
-use subsurface::{
-    Atlas, Error, Normals, Output, Plan, PlannedScreenSpace, Profile, ScreenFrame, ScreenSpace,
-    TextureSpace, Viewport,
-};
+use subsurface::{Atlas, Error, Frame, Output, Plan, Profile, ScreenSpace, TextureSpace, Viewport};
+use subsurface_lab::synthetic::{View, gpu};
 
 const SIZE: [u32; 2] = [16, 8];
+const HALF: TextureFormat = TextureFormat::Rgba16Float;
 
 fn view(format: TextureFormat) -> TextureView {
     gpu().target("input", SIZE, format)
 }
 
+fn small(format: TextureFormat) -> TextureView {
+    gpu().target("small", [8, 8], format)
+}
+
 fn texture(format: TextureFormat, usage: TextureUsages, samples: u32) -> TextureView {
-    gpu()
-        .device
-        .create_texture(&wgpu::TextureDescriptor {
-            label: None,
-            size: wgpu::Extent3d {
-                width: SIZE[0],
-                height: SIZE[1],
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: samples,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage,
-            view_formats: &[],
-        })
-        .create_view(&Default::default())
-}
-
-/// Prepares a frame in which `change` has changed one thing, by both effects.
-fn screen(change: impl FnOnce(&mut Inputs)) -> Result<(), Error> {
-    let mut inputs = Inputs {
-        irradiance: view(TextureFormat::Rgba16Float),
-        depth: view(TextureFormat::Depth32Float),
-        profile_id: Some(view(TextureFormat::R8Uint)),
-        normal: None,
-        strength: None,
-        output: view(TextureFormat::Rgba16Float),
-        viewport: None,
-        projection: common::View::perspective(SIZE, 40.0).projection.as_mat4(),
-        mm_per_unit: 1.0,
-        profiles: vec![Profile::SKIN],
-    };
-    change(&mut inputs);
-    let frame = ScreenFrame {
-        irradiance: &inputs.irradiance,
-        depth: &inputs.depth,
-        profile_id: inputs.profile_id.as_ref(),
-        normal: inputs.normal.as_ref().map(|(texture, to_view)| Normals {
-            texture,
-            to_view: *to_view,
-        }),
-        strength: inputs.strength.as_ref(),
-        viewport: inputs.viewport,
-        output: &inputs.output,
-        projection: inputs.projection,
-        mm_per_unit: inputs.mm_per_unit,
-        profiles: &inputs.profiles,
-    };
-    let gpu = gpu();
-    // Whatever gets past the checks must not trip the device's own.
-    let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let mut exact = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float)?;
-    let mut planned = PlannedScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float)?;
-    let result = exact.prepare(&gpu.device, &frame);
-    let by_plan = planned.prepare(&gpu.device, &gpu.queue, &frame, plan(&inputs.profiles));
-    gpu.run(|encoder| {
-        exact.render(encoder);
-        planned.render(encoder);
+    let texture = gpu().device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d {
+            width: SIZE[0],
+            height: SIZE[1],
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: samples,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
     });
-    let error = pollster(scope.pop());
-    assert!(error.is_none(), "{error:?}");
-    assert_eq!(result, by_plan);
-    result
+    texture.create_view(&Default::default())
 }
 
-/// One for as many profiles of skin, or for one where there cannot be any.
-fn plan(profiles: &[Profile]) -> &'static Plan {
-    static ONE: OnceLock<Plan> = OnceLock::new();
-    static ALL: OnceLock<Plan> = OnceLock::new();
-    let (plan, count) = match profiles.len() {
-        16 => (&ALL, 16),
-        _ => (&ONE, 1),
-    };
-    plan.get_or_init(|| Plan::new(&vec![Profile::SKIN; count], 0.01).unwrap())
+/// The exact sum, and a plan.
+fn plans() -> &'static [Plan; 2] {
+    static PLANS: OnceLock<[Plan; 2]> = OnceLock::new();
+    PLANS.get_or_init(|| {
+        let skin = [Profile::SKIN];
+        [Plan::exact(&skin).unwrap(), Plan::new(&skin, 0.01).unwrap()]
+    })
+}
+
+fn effects() -> &'static [ScreenSpace; 2] {
+    static EFFECTS: OnceLock<[ScreenSpace; 2]> = OnceLock::new();
+    EFFECTS.get_or_init(|| {
+        let effect = |plan| ScreenSpace::new(&gpu().device, HALF, plan).unwrap();
+        plans().each_ref().map(effect)
+    })
 }
 
 struct Inputs {
     irradiance: TextureView,
     depth: TextureView,
     profile_id: Option<TextureView>,
-    normal: Option<(TextureView, Mat3)>,
     strength: Option<TextureView>,
+    albedo: Option<TextureView>,
     output: TextureView,
     viewport: Option<Viewport>,
     projection: Mat4,
     mm_per_unit: f32,
-    profiles: Vec<Profile>,
+}
+
+impl Inputs {
+    fn new() -> Self {
+        Self {
+            irradiance: view(HALF),
+            depth: view(TextureFormat::Depth32Float),
+            profile_id: Some(view(TextureFormat::R8Uint)),
+            strength: None,
+            albedo: None,
+            output: view(HALF),
+            viewport: None,
+            projection: View::perspective(SIZE, 40.0).projection.as_mat4(),
+            mm_per_unit: 1.0,
+        }
+    }
+
+    fn frame(&self) -> Frame<'_> {
+        let projection = self.projection.to_cols_array_2d();
+        let mut frame = Frame::new(&self.irradiance, &self.depth, projection);
+        frame.profile_id = self.profile_id.as_ref();
+        frame.strength = self.strength.as_ref();
+        frame.albedo = self.albedo.as_ref();
+        frame.viewport = self.viewport;
+        frame.mm_per_unit = self.mm_per_unit;
+        frame
+    }
+}
+
+/// Scatters a frame of which one thing has changed, by the exact sum and by a plan.
+fn screen(change: impl FnOnce(&mut Inputs)) -> Result<(), Error> {
+    let mut inputs = Inputs::new();
+    change(&mut inputs);
+    let gpu = gpu();
+    // Whatever gets past the checks must not trip the device's own.
+    let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::Validation);
+    let results = effects().each_ref().map(|effect| {
+        let mut view = subsurface::View::new();
+        view.prepare(&gpu.device, &gpu.queue, effect, &inputs.frame())?;
+        gpu.run(|encoder| view.render(encoder, &inputs.output))
+    });
+    let error = pollster(scope.pop());
+    assert!(error.is_none(), "{error:?}");
+    let [exact, planned] = results;
+    // As text, since a matrix may hold NaN, which equals nothing.
+    assert_eq!(format!("{exact:?}"), format!("{planned:?}"));
+    exact
 }
 
 /// Validation errors are known at once.
@@ -121,130 +124,88 @@ fn pollster<T>(future: impl Future<Output = T>) -> T {
 
 #[test]
 fn what_fits_is_taken() {
+    use TextureFormat as F;
     screen(|_| ()).unwrap();
-    for depth in [
-        TextureFormat::Depth16Unorm,
-        TextureFormat::Depth24Plus,
-        TextureFormat::R32Float,
-    ] {
+    for depth in [F::Depth16Unorm, F::Depth24Plus, F::R32Float] {
         screen(|i| i.depth = view(depth)).unwrap();
     }
-    screen(|i| i.irradiance = view(TextureFormat::Rgba32Float)).unwrap();
-    let packed = texture(
-        TextureFormat::Rg11b10Ufloat,
-        TextureUsages::TEXTURE_BINDING,
-        1,
-    );
+    screen(|i| i.irradiance = view(F::Rgba32Float)).unwrap();
+    let packed = texture(F::Rg11b10Ufloat, TextureUsages::TEXTURE_BINDING, 1);
     screen(|i| i.irradiance = packed).unwrap();
-    screen(|i| i.profile_id = Some(view(TextureFormat::R32Uint))).unwrap();
+    screen(|i| i.profile_id = Some(view(F::R32Uint))).unwrap();
     screen(|i| i.profile_id = None).unwrap();
-    for normal in [
-        TextureFormat::Rgba16Float,
-        TextureFormat::Rgb10a2Unorm,
-        TextureFormat::Rgba8Unorm,
-    ] {
-        screen(|i| i.normal = Some((view(normal), Mat3::IDENTITY))).unwrap();
-    }
-    for strength in [TextureFormat::R8Unorm, TextureFormat::Rgba16Float] {
+    for strength in [F::R8Unorm, F::Rgba16Float] {
         screen(|i| i.strength = Some(view(strength))).unwrap();
     }
     for [x, y, width, height] in [[0, 0, 16, 8], [15, 7, 1, 1], [3, 2, 9, 5]] {
-        screen(|i| {
-            i.viewport = Some(Viewport {
-                x,
-                y,
-                width,
-                height,
-            })
-        })
-        .unwrap();
+        let viewport = Viewport {
+            x,
+            y,
+            width,
+            height,
+        };
+        screen(|i| i.viewport = Some(viewport)).unwrap();
     }
-    screen(|i| i.profiles = vec![Profile::SKIN; 16]).unwrap();
+    let sixteen = Plan::exact(&[Profile::SKIN; 16]).unwrap();
+    ScreenSpace::new(&gpu().device, HALF, &sixteen).unwrap();
+}
+
+/// A sentence begins with the name of the input and says what it got and needs.
+fn assert_names(error: &Error, name: &str) {
+    let said = error.to_string();
+    assert!(said.starts_with(name), "{said}\nshould be about {name}");
+    assert!(said.contains("got") && said.contains("needs"), "{said}");
 }
 
 #[test]
 fn what_does_not_fit_is_named() {
-    let refused = |name: &str, change: fn(&mut Inputs)| {
-        let error = screen(change).expect_err(name).to_string();
-        assert!(error.starts_with(name), "{error}\nshould be about {name}");
-        assert!(error.contains("got") && error.contains("needs"), "{error}");
-    };
-    refused("irradiance: format", |i| {
-        i.irradiance = view(TextureFormat::Rgba8Uint)
-    });
-    refused("irradiance: format", |i| {
-        i.irradiance = view(TextureFormat::R16Float)
-    });
-    refused("depth: format", |i| {
-        i.depth = view(TextureFormat::Rgba16Float)
-    });
-    refused("depth: format", |i| i.depth = view(TextureFormat::R8Unorm));
-    refused("depth: format", |i| i.depth = view(TextureFormat::R16Float));
-    refused("profile_id: format", |i| {
-        i.profile_id = Some(view(TextureFormat::R8Unorm))
-    });
-    refused("normal: format", |i| {
-        i.normal = Some((view(TextureFormat::Rg16Float), Mat3::IDENTITY))
-    });
-    refused("normal: format", |i| {
-        let unsigned = texture(
-            TextureFormat::Rg11b10Ufloat,
-            TextureUsages::TEXTURE_BINDING,
-            1,
-        );
-        i.normal = Some((unsigned, Mat3::IDENTITY));
-    });
-    refused("normal: format", |i| {
-        i.normal = Some((view(TextureFormat::Rgba8UnormSrgb), Mat3::IDENTITY))
-    });
-    refused("normal: size", |i| {
-        let small = gpu().target("small", [8, 8], TextureFormat::Rgba16Float);
-        i.normal = Some((small, Mat3::IDENTITY));
-    });
-    for to_view in [Mat3::ZERO, Mat3::NAN] {
-        let normal = Some((view(TextureFormat::Rgba16Float), to_view));
-        let error = screen(|i| i.normal = normal).unwrap_err();
-        assert_eq!(error.input, "normal: to_view");
+    use TextureFormat as F;
+    type Change = fn(&mut Inputs);
+    let table: [(&str, Change); 25] = [
+        ("irradiance: format", |i| i.irradiance = view(F::Rgba8Uint)),
+        ("irradiance: format", |i| i.irradiance = view(F::R16Float)),
+        ("depth: format", |i| i.depth = view(F::Rgba16Float)),
+        ("depth: format", |i| i.depth = view(F::R8Unorm)),
+        ("depth: format", |i| i.depth = view(F::R16Float)),
+        ("profile_id: format", |i| {
+            i.profile_id = Some(view(F::R8Unorm))
+        }),
+        ("strength: format", |i| i.strength = Some(view(F::R8Uint))),
+        ("strength: format", |i| {
+            i.strength = Some(view(F::Depth32Float))
+        }),
+        ("strength: size", |i| i.strength = Some(small(F::R8Unorm))),
+        ("albedo: got a texture", |i| i.albedo = Some(view(HALF))),
+        ("albedo: format", |i| i.albedo = Some(view(F::R8Unorm))),
+        ("depth: size", |i| i.depth = small(F::Depth32Float)),
+        ("depth: got a D2 texture with 4 samples", |i| {
+            let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::RENDER_ATTACHMENT;
+            i.depth = texture(F::Depth32Float, usage, 4);
+        }),
+        ("irradiance: usage", |i| {
+            i.irradiance = texture(HALF, TextureUsages::RENDER_ATTACHMENT, 1);
+        }),
+        ("output: format", |i| i.output = view(F::Rgba32Float)),
+        ("output: size", |i| i.output = small(HALF)),
+        ("output: usage", |i| {
+            i.output = texture(HALF, TextureUsages::TEXTURE_BINDING, 1);
+        }),
+        ("output: got the texture of irradiance", |i| {
+            i.output = i.irradiance.clone();
+        }),
+        ("output: got the texture of strength", |i| {
+            i.strength = Some(i.output.clone());
+        }),
+        ("projection", |i| i.projection = Mat4::ZERO),
+        ("projection", |i| i.projection.x_axis.x = f32::NAN),
+        ("projection", |i| i.projection.x_axis.y = 0.5),
+        ("mm_per_unit", |i| i.mm_per_unit = 0.0),
+        ("mm_per_unit", |i| i.mm_per_unit = -1.0),
+        ("mm_per_unit", |i| i.mm_per_unit = f32::NAN),
+    ];
+    for (name, change) in table {
+        assert_names(&screen(change).expect_err(name), name);
     }
-    refused("strength: format", |i| {
-        i.strength = Some(view(TextureFormat::R8Uint))
-    });
-    refused("strength: format", |i| {
-        i.strength = Some(view(TextureFormat::Depth32Float))
-    });
-    refused("strength: size", |i| {
-        i.strength = Some(gpu().target("small", [8, 8], TextureFormat::R8Unorm));
-    });
-    refused("output: got the texture of strength", |i| {
-        i.strength = Some(i.output.clone())
-    });
-    refused("output: format", |i| {
-        i.output = view(TextureFormat::Rgba32Float)
-    });
-    refused("depth: size", |i| {
-        i.depth = gpu().target("small", [8, 8], TextureFormat::Depth32Float);
-    });
-    refused("depth: got D2 with 4 samples", |i| {
-        let usage = TextureUsages::TEXTURE_BINDING | TextureUsages::RENDER_ATTACHMENT;
-        i.depth = texture(TextureFormat::Depth32Float, usage, 4);
-    });
-    refused("irradiance: usage", |i| {
-        i.irradiance = texture(
-            TextureFormat::Rgba16Float,
-            TextureUsages::RENDER_ATTACHMENT,
-            1,
-        );
-    });
-    refused("output: usage", |i| {
-        i.output = texture(
-            TextureFormat::Rgba16Float,
-            TextureUsages::TEXTURE_BINDING,
-            1,
-        );
-    });
-    refused("output: got the texture of irradiance", |i| {
-        i.output = i.irradiance.clone()
-    });
     for [x, y, width, height] in [
         [0, 0, 0, 8],
         [0, 0, 17, 8],
@@ -258,98 +219,56 @@ fn what_does_not_fit_is_named() {
             height,
         };
         let error = screen(|i| i.viewport = Some(viewport)).unwrap_err();
-        assert_eq!(error.input, "viewport");
+        assert_names(&error, "viewport");
     }
-    refused("projection", |i| i.projection = Mat4::ZERO);
-    refused("projection", |i| i.projection.x_axis.x = f32::NAN);
-    refused("projection", |i| i.projection.x_axis.y = 0.5);
-    for bad in [0.0, -1.0, f32::INFINITY, f32::NAN] {
-        let error = screen(|i| i.mm_per_unit = bad).unwrap_err();
-        assert_eq!(error.input, "mm_per_unit");
-    }
-    refused("profiles", |i| i.profiles.clear());
-    refused("profiles", |i| i.profiles = vec![Profile::SKIN; 17]);
-}
-
-#[test]
-fn an_output_format_that_cannot_be_drawn_to_is_named() {
-    let device = &gpu().device;
-    for format in [
-        TextureFormat::Rgba8Uint,
-        TextureFormat::Depth32Float,
-        TextureFormat::Bc1RgbaUnorm,
-    ] {
-        let error = ScreenSpace::new(device, format).err().expect("refused");
-        assert_eq!(error.input, "output: format");
-        assert!(TextureSpace::new(device, format).is_err());
+    for count in [0, 17] {
+        let error = Plan::exact(&vec![Profile::SKIN; count]).unwrap_err();
+        assert_names(&error, "profiles");
+        let texture = TextureSpace::new(&gpu().device, HALF, &vec![Profile::SKIN; count]);
+        assert_names(&texture.unwrap_err(), "profiles");
     }
 }
 
 #[test]
-fn an_output_format_that_cannot_be_blended_is_named() {
+fn an_output_that_cannot_be_drawn_to_is_named() {
+    use TextureFormat as F;
     let device = &gpu().device;
-    for output in [Output::AddScattered, Output::AddDifference] {
-        assert!(ScreenSpace::new(device, output(TextureFormat::Rgba16Float)).is_ok());
-        let full = output(TextureFormat::Rgba32Float);
-        let errors = [
-            ScreenSpace::new(device, full).err(),
-            PlannedScreenSpace::new(device, full).err(),
-        ];
-        for error in errors {
-            assert_eq!(error.expect("refused").input, "output: format");
+    for plan in plans() {
+        for output in [
+            Output::Scattered(F::Rgba8Uint),
+            Output::Scattered(F::Depth32Float),
+            Output::Scattered(F::Bc1RgbaUnorm),
+            // Not blended without a feature.
+            Output::AddScattered(F::Rgba32Float),
+            Output::AddDifference(F::Rgba32Float),
+            // What is added may be negative.
+            Output::AddScattered(F::Rgba8Unorm),
+            Output::AddDifference(F::Rgba8Unorm),
+        ] {
+            let error = ScreenSpace::new(device, output, plan).unwrap_err();
+            assert_names(&error, "output: format");
+        }
+        for output in [Output::AddScattered(HALF), Output::AddDifference(HALF)] {
+            ScreenSpace::new(device, output, plan).unwrap();
         }
     }
+    assert!(TextureSpace::new(device, F::Rgba8Uint, &[Profile::SKIN]).is_err());
 }
 
-#[test]
-fn sums_in_place_need_a_sign() {
-    let unorm = TextureFormat::Rgba8Unorm;
-    let error = ScreenSpace::new(&gpu().device, Output::AddDifference(unorm));
-    assert_eq!(error.err().expect("refused").input, "output: format");
-    let error = PlannedScreenSpace::new(&gpu().device, Output::AddScattered(unorm));
-    assert_eq!(error.err().expect("refused").input, "output: format");
-}
-
-/// A plan of other profiles than the frame's, and projections that only the exact effect takes.
+/// Projections that only the exact sum takes.
 #[test]
 fn what_a_plan_cannot_do_is_named() {
     let gpu = gpu();
-    let views = [
-        TextureFormat::Rgba16Float,
-        TextureFormat::Depth32Float,
-        TextureFormat::Rgba16Float,
-    ]
-    .map(view);
-    let frame = ScreenFrame {
-        irradiance: &views[0],
-        depth: &views[1],
-        profile_id: None,
-        normal: None,
-        strength: None,
-        viewport: None,
-        output: &views[2],
-        projection: common::View::perspective(SIZE, 40.0).projection.as_mat4(),
-        mm_per_unit: 1.0,
-        profiles: &[Profile::SKIN],
-    };
-    let mut effect = PlannedScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float).unwrap();
-    let mut prepare = |frame: &ScreenFrame, plan: &Plan| {
-        let result = effect.prepare(&gpu.device, &gpu.queue, frame, plan);
-        result.err().map(|error| error.input)
-    };
-    let one = plan(frame.profiles);
-    assert_eq!(prepare(&frame, one), None);
-    let sixteen = plan(&[Profile::SKIN; 16]);
-    assert_eq!(prepare(&frame, sixteen), Some("plan".into()));
-    let mut oblique = frame;
-    oblique.projection.x_axis.z = 0.1;
-    assert_eq!(prepare(&oblique, one), Some("projection".into()));
-    let mut left_handed = frame;
-    left_handed.projection.z_axis *= -1.0;
-    assert_eq!(prepare(&left_handed, one), Some("projection".into()));
-    let mut exact = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float).unwrap();
-    exact.prepare(&gpu.device, &oblique).unwrap();
-    exact.prepare(&gpu.device, &left_handed).unwrap();
+    let [exact, planned] = effects();
+    let changes: [fn(&mut Mat4); 2] = [|p| p.x_axis.z = 0.1, |p| p.z_axis *= -1.0];
+    for change in changes {
+        let mut inputs = Inputs::new();
+        change(&mut inputs.projection);
+        let mut view = subsurface::View::new();
+        let mut prepare = |effect| view.prepare(&gpu.device, &gpu.queue, effect, &inputs.frame());
+        prepare(exact).unwrap();
+        assert_names(&prepare(planned).unwrap_err(), "projection");
+    }
 }
 
 #[test]
@@ -358,114 +277,94 @@ fn a_frame_that_was_refused_leaves_the_one_before() {
     // Lit on the right.
     let lit = |i: u32| [f32::from(u8::from(i % SIZE[0] >= 8)); 4];
     let light: Vec<[f32; 4]> = (0..SIZE[0] * SIZE[1]).map(lit).collect();
-    let irradiance = gpu.upload("irradiance", SIZE, TextureFormat::Rgba32Float, &light);
-    let depth = gpu.upload("depth", SIZE, TextureFormat::R32Float, &[0.5f32; 128]);
-    let outputs = [(); 2].map(|()| view(TextureFormat::Rgba32Float));
-    let good = ScreenFrame {
-        irradiance: &irradiance,
-        depth: &depth,
-        profile_id: None,
-        normal: None,
-        strength: None,
-        viewport: None,
-        output: &outputs[0],
-        projection: common::View::perspective(SIZE, 40.0).projection.as_mat4(),
-        mm_per_unit: 1.0,
-        profiles: &[Profile::SKIN],
-    };
-    let bad = ScreenFrame {
-        mm_per_unit: -1.0,
-        ..good
-    };
-    let mut exact = ScreenSpace::new(&gpu.device, TextureFormat::Rgba32Float).unwrap();
-    let mut planned = PlannedScreenSpace::new(&gpu.device, TextureFormat::Rgba32Float).unwrap();
-    let plan = plan(good.profiles);
-    exact.prepare(&gpu.device, &good).unwrap();
-    exact.prepare(&gpu.device, &bad).unwrap_err();
-    let by_plan = ScreenFrame {
-        output: &outputs[1],
-        ..good
-    };
-    let prepared = planned.prepare(&gpu.device, &gpu.queue, &by_plan, plan);
-    prepared.unwrap();
-    let refused = planned.prepare(&gpu.device, &gpu.queue, &bad, plan);
-    refused.unwrap_err();
-    gpu.run(|encoder| {
-        exact.render(encoder);
-        planned.render(encoder);
-    });
-    let [exact, planned] = outputs.each_ref().map(|output| gpu.read(output));
-    for (i, (a, b)) in exact.iter().zip(&planned).enumerate() {
-        // Light has crossed the edge.
-        let beside = (6..10).contains(&(i % SIZE[0] as usize));
-        assert!(!beside || a[0] > 0.01 && a[0] < 0.99, "{i}: {a:?}");
-        // Near the border a plan is off by more than it states.
-        assert!((a[0] - b[0]).abs() < 0.05, "{i}: {a:?} {b:?}");
+    let mut inputs = Inputs::new();
+    inputs.irradiance = gpu.upload("irradiance", SIZE, TextureFormat::Rgba32Float, &light);
+    inputs.depth = gpu.upload("depth", SIZE, TextureFormat::R32Float, &[0.5f32; 128]);
+    inputs.profile_id = None;
+    for effect in effects() {
+        let mut view = subsurface::View::new();
+        let good = inputs.frame();
+        view.prepare(&gpu.device, &gpu.queue, effect, &good)
+            .unwrap();
+        let mut bad = good;
+        bad.mm_per_unit = -1.0;
+        view.prepare(&gpu.device, &gpu.queue, effect, &bad)
+            .unwrap_err();
+        gpu.run(|encoder| view.render(encoder, &inputs.output))
+            .unwrap();
+        for (i, pixel) in gpu.read(&inputs.output).iter().enumerate() {
+            // Light has crossed the edge.
+            let beside = (6..10).contains(&(i % SIZE[0] as usize));
+            assert!(!beside || pixel[0] > 0.01 && pixel[0] < 0.99, "{i}");
+        }
     }
 }
 
 #[test]
 fn the_atlas_is_checked_too() {
     let gpu = gpu();
-    let mut path = TextureSpace::new(&gpu.device, TextureFormat::Rgba16Float).unwrap();
-    let irradiance = view(TextureFormat::Rgba16Float);
-    let output = view(TextureFormat::Rgba16Float);
-    let mut prepare = |positions: &TextureView, output: &TextureView| {
-        path.prepare(
-            &gpu.device,
-            &Atlas {
-                irradiance: &irradiance,
-                positions,
-                output,
-                mm_per_unit: 1000.0,
-                profiles: &[Profile::SKIN],
-            },
-        )
+    let mut path = TextureSpace::new(&gpu.device, HALF, &[Profile::SKIN]).unwrap();
+    let irradiance = view(HALF);
+    let mut prepare = |positions: &TextureView, mm_per_unit: f32| {
+        let atlas = Atlas {
+            irradiance: &irradiance,
+            positions,
+            mm_per_unit,
+        };
+        path.prepare(&gpu.device, &gpu.queue, &atlas)
     };
     let positions = view(TextureFormat::Rgba32Float);
-    prepare(&positions, &output).unwrap();
-    assert_eq!(
-        prepare(&view(TextureFormat::R8Uint), &output)
-            .unwrap_err()
-            .input,
-        "positions: format"
-    );
-    assert_eq!(
-        prepare(&positions, &irradiance).unwrap_err().input,
-        "output"
-    );
+    prepare(&positions, 1000.0).unwrap();
+    let error = prepare(&view(TextureFormat::R8Uint), 1000.0).unwrap_err();
+    assert_names(&error, "positions: format");
+    assert_names(&prepare(&positions, 0.0).unwrap_err(), "mm_per_unit");
+    let render = |output: &TextureView| gpu.run(|encoder| path.render(encoder, output));
+    assert_names(&render(&irradiance).unwrap_err(), "output");
+    render(&view(HALF)).unwrap();
 }
 
 #[test]
 fn nothing_is_drawn_before_the_first_frame() {
     let gpu = gpu();
-    let effect = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float).unwrap();
-    gpu.run(|encoder| effect.render(encoder));
+    let output = view(HALF);
+    let texture = TextureSpace::new(&gpu.device, HALF, &[Profile::SKIN]).unwrap();
+    let results = gpu.run(|encoder| {
+        [
+            subsurface::View::new().render(encoder, &output),
+            texture.render(encoder, &output),
+        ]
+    });
+    assert_eq!(results, [Err(Error::NotPrepared), Err(Error::NotPrepared)]);
 }
 
 #[test]
 fn sizes_may_change_from_frame_to_frame() {
     let gpu = gpu();
-    let mut effect = ScreenSpace::new(&gpu.device, TextureFormat::Rgba16Float).unwrap();
-    for size in [[16, 8], [1, 1], [1, 40], [33, 7], [16, 8]] {
-        let target = |format| gpu.target("input", size, format);
-        effect
-            .prepare(
-                &gpu.device,
-                &ScreenFrame {
-                    irradiance: &target(TextureFormat::Rgba16Float),
-                    depth: &target(TextureFormat::Depth32Float),
-                    profile_id: Some(&target(TextureFormat::R8Uint)),
-                    normal: None,
-                    strength: None,
-                    viewport: None,
-                    output: &target(TextureFormat::Rgba16Float),
-                    projection: common::View::perspective(size, 40.0).projection.as_mat4(),
-                    mm_per_unit: 1.0,
-                    profiles: &[Profile::SKIN],
-                },
-            )
-            .unwrap();
-        gpu.run(|encoder| effect.render(encoder));
+    for effect in effects() {
+        let mut view = subsurface::View::new();
+        for size in [[16, 8], [1, 1], [1, 40], [33, 7], [16, 8]] {
+            let target = |format| gpu.target("input", size, format);
+            let (irradiance, depth) = (target(HALF), target(TextureFormat::Depth32Float));
+            let projection = View::perspective(size, 40.0).projection.as_mat4();
+            let frame = Frame::new(&irradiance, &depth, projection.to_cols_array_2d());
+            view.prepare(&gpu.device, &gpu.queue, effect, &frame)
+                .unwrap();
+            gpu.run(|encoder| view.render(encoder, &target(HALF)))
+                .unwrap();
+        }
+    }
+}
+
+/// What everything public prints of itself names what it is.
+#[test]
+fn all_that_is_public_can_be_debugged() {
+    let [exact, planned] = effects();
+    for (said, name) in [
+        (format!("{exact:?}"), "ScreenSpace"),
+        (format!("{planned:?}"), "ScreenSpace"),
+        (format!("{:?}", subsurface::View::new()), "View"),
+        (format!("{:?}", Inputs::new().frame()), "Frame"),
+    ] {
+        assert!(said.starts_with(name), "{said}");
     }
 }

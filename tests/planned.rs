@@ -1,14 +1,13 @@
 //! Scattering by a plan against closed forms, and against what the plan states.
 
-mod common;
-
 use std::sync::OnceLock;
 
-use common::*;
 use glam::{DVec2, DVec3};
-use subsurface::truth::closed_form::{scattered_cosine, scattered_step, step};
 use subsurface::wgpu::TextureFormat;
-use subsurface::{Plan, PlannedScreenSpace, Profile, ScreenFrame};
+use subsurface::{Error, Frame, Plan, Profile};
+use subsurface_lab::method::{self, Ours};
+use subsurface_lab::synthetic::*;
+use subsurface_lab::truth::closed_form::{scattered_cosine, scattered_step, step};
 
 /// Plans of the skin profile at 1/100 and 1/255.
 fn plans() -> &'static [Plan; 2] {
@@ -32,7 +31,7 @@ fn edge_error(plan: &Plan, px_per_mm: f64, angle: f64) -> f64 {
     let g = view.shoot(plane(DVec3::Z, 300.0, |p| {
         DVec3::splat(step(p.dot(across), blur_mm2))
     }));
-    let out = g.scatter_planned(&[Profile::SKIN], plan);
+    let out = g.scatter_planned(plan);
     let half = DVec2::splat(200.0 / px_per_mm - REACH_MM);
     let inside = g.pixels(|h| h.point.truncate().abs().cmplt(half).all());
     let errors = inside.iter().map(|(i, hit)| {
@@ -65,7 +64,7 @@ fn hard_edges_keep_it_too() {
             let g = View::orthographic([300, 300], px_per_mm).shoot(plane(DVec3::Z, 300.0, |p| {
                 DVec3::splat(step(p.dot(across), 0.0))
             }));
-            let out = g.scatter_planned(&[Profile::SKIN], plan);
+            let out = g.scatter_planned(plan);
             let out: Vec<DVec3> = out.into_iter().map(rgb).collect();
             // Across the middle of the edge, far from the picture's border.
             let along = DVec3::new(-across.y, across.x, 0.0);
@@ -90,7 +89,7 @@ fn hard_edges_keep_it_too() {
 
 /// Errors on a soft edge at places in mm from it, under a camera that looks at `center_mm`.
 fn errors_at(
-    effect: &mut PlannedScreenSpace,
+    effect: &mut Ours,
     view: View,
     px_per_mm: f64,
     center_mm: f64,
@@ -100,12 +99,7 @@ fn errors_at(
     let g = view.shoot(plane(DVec3::Z, 300.0, |p| {
         DVec3::splat(step(p.x + center_mm, blur_mm2))
     }));
-    let format = TextureFormat::Rgba32Float;
-    let out = g.render(&[Profile::SKIN], format, |frame, encoder| {
-        let (device, queue) = (&gpu().device, &gpu().queue);
-        effect.prepare(device, queue, frame, &plans()[1]).unwrap();
-        effect.render(encoder);
-    });
+    let out = g.scatter_by(effect, |_| ());
     let [width, height] = view.size.map(|s| s as usize);
     let row = &out[height / 2 * width..][..width];
     let error = |x: usize| {
@@ -121,7 +115,7 @@ fn errors_at(
 
 #[test]
 fn a_moving_camera_does_not_make_skin_flicker() {
-    let mut effect = PlannedScreenSpace::new(&gpu().device, TextureFormat::Rgba32Float).unwrap();
+    let mut effect = ours(&plans()[1], TextureFormat::Rgba32Float);
     // By fractions of a pixel over what the coarse levels repeat after.
     for px_per_mm in [1.5, 4.0, 8.0] {
         let blur_mm2 = f64::powi(px_per_mm, -2);
@@ -146,7 +140,7 @@ fn a_moving_camera_does_not_make_skin_flicker() {
 
 #[test]
 fn zooming_in_goes_without_steps() {
-    let mut effect = PlannedScreenSpace::new(&gpu().device, TextureFormat::Rgba32Float).unwrap();
+    let mut effect = ours(&plans()[1], TextureFormat::Rgba32Float);
     // From .3 to 30 px/mm in 200 steps, the light soft by a pixel of the first.
     let blur_mm2 = f64::powi(0.3, -2);
     let places: Vec<f64> = (-8..=8).map(|i| 0.5 * f64::from(i)).collect();
@@ -191,7 +185,7 @@ fn slopes_keep_it_while_they_are_not_steep() {
             let g = view.shoot(plane(normal, 500.0, |p| {
                 DVec3::splat(step(p.dot(across), blur_mm2))
             }));
-            let out = g.scatter_planned(&[Profile::SKIN], &plans()[1]);
+            let out = g.scatter_planned(&plans()[1]);
             let half = DVec2::splat(160.0 / px_per_mm - 9.6);
             let near = |h: &Hit| (h.point - anchor).dot(across).abs() < 6.0;
             let pixels = g.pixels(|h| h.point.truncate().abs().cmplt(half).all() && near(h));
@@ -225,7 +219,7 @@ fn hard_edges_down_a_slope_are_off_by_no_more_than_the_docs_say() {
             let g = view.shoot(plane(tilted_normal(tilt, 0.0), 500.0, |p| {
                 DVec3::splat(step(p.x, 0.0))
             }));
-            let out = g.scatter_planned(&[Profile::SKIN], &plans()[1]);
+            let out = g.scatter_planned(&plans()[1]);
             let out: Vec<DVec3> = out.into_iter().map(rgb).collect();
             let middle =
                 |h: &Hit| h.point.y.abs() < 1.0 / px_per_mm && h.point.x.abs() < 8.0 / px_per_mm;
@@ -249,7 +243,7 @@ fn a_sphere_is_as_near_to_eq_7_as_the_docs_say() {
     let g = view.shoot(sphere(rho_mm, 300.0, |n| {
         DVec3::splat(n.dot(light).max(0.0))
     }));
-    let out = g.scatter_planned(&[Profile::SKIN], &plans()[1]);
+    let out = g.scatter_planned(&plans()[1]);
     let inside = g.pixels(|h| h.normal.z > 0.35);
     let error = rms(inside
         .iter()
@@ -271,7 +265,7 @@ fn layers_leak_no_more_than_the_docs_say() {
                     .filter(|hit| hit.point.dot(across) < 0.0)
                     .or_else(|| far(origin, ray))
             });
-            let out = g.scatter_planned(&[Profile::SKIN], &plans()[1]);
+            let out = g.scatter_planned(&plans()[1]);
             let out: Vec<DVec3> = out.into_iter().map(rgb).collect();
             let near =
                 |h: &Hit| h.point.dot(across).abs() < 6.0 && h.point.truncate().length() < 20.0;
@@ -300,7 +294,7 @@ fn constant_light_stays_constant() {
         (!holes).then_some(hit)
     });
     for plan in plans() {
-        let out = g.scatter_planned(&[Profile::SKIN], plan);
+        let out = g.scatter_planned(plan);
         for (i, _) in g.pixels(|_| true) {
             // A few half floats of rounding, each 2⁻¹² of the value.
             let error = (rgb(out[i]) - e).abs().max_element();
@@ -317,7 +311,7 @@ fn other_pixels_stay_bit_for_bit() {
         // Nothing at all.
         View::perspective([64, 33], 40.0).shoot(|_, _| None),
     ] {
-        let out = g.scatter_planned(&[Profile::SKIN], &plans()[1]);
+        let out = g.scatter_planned(&plans()[1]);
         for (pixel, hit) in out.iter().zip(&g.hits) {
             if hit.is_none() {
                 assert_eq!(*pixel, [0.25, 0.25, 0.25, 0.5]);
@@ -340,7 +334,7 @@ fn no_scattering_leaks_onto_another_profile() {
             Some(Hit { id, ..hit })
         });
         let plan = Plan::new(&profiles, max_error).unwrap();
-        let out = g.scatter_planned(&profiles, &plan);
+        let out = g.scatter_planned(&plan);
         for (i, hit) in g.pixels(|_| true) {
             let error = (rgb(out[i]) - hit.irradiance).abs().max_element();
             assert!(error < 0.001, "{tilt}°, pixel {i}: {error}");
@@ -350,28 +344,20 @@ fn no_scattering_leaks_onto_another_profile() {
 
 #[test]
 fn frames_of_every_size_are_scattered() {
-    let mut effect = PlannedScreenSpace::new(&gpu().device, TextureFormat::Rgba16Float).unwrap();
+    let mut effect = ours(&plans()[1], TextureFormat::Rgba16Float);
     for size in [[1, 1], [1, 70], [333, 2], [17, 16]] {
         let gpu = gpu();
         let count = (size[0] * size[1]) as usize;
         let output = gpu.target("output", size, TextureFormat::Rgba16Float);
         let light = vec![[1.0f32, 0.5, 0.25, 1.0]; count];
-        let frame = ScreenFrame {
-            irradiance: &gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &light),
-            depth: &gpu.upload("depth", size, TextureFormat::R32Float, &vec![0.5f32; count]),
-            profile_id: Some(&gpu.upload("id", size, TextureFormat::R8Uint, &vec![1u8; count])),
-            normal: None,
-            strength: None,
-            viewport: None,
-            output: &output,
-            projection: View::orthographic(size, 4.0).projection.as_mat4(),
-            mm_per_unit: 1.0,
-            profiles: &[Profile::SKIN],
-        };
-        effect
-            .prepare(&gpu.device, &gpu.queue, &frame, &plans()[1])
-            .unwrap();
-        gpu.run(|encoder| effect.render(encoder));
+        let light = gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &light);
+        let depth = gpu.upload("depth", size, TextureFormat::R32Float, &vec![0.5f32; count]);
+        let id = gpu.upload("id", size, TextureFormat::R8Uint, &vec![1u8; count]);
+        let projection = View::orthographic(size, 4.0).projection.as_mat4();
+        let mut frame = Frame::new(&light, &depth, projection.to_cols_array_2d());
+        frame.profile_id = Some(&id);
+        frame.mm_per_unit = 1.0;
+        method::scatter(gpu, &mut effect, &frame, &output).unwrap();
         for pixel in gpu.read(&output) {
             assert!((pixel[1] - 0.5).abs() < 0.001, "{size:?}: {pixel:?}");
         }
@@ -380,17 +366,17 @@ fn frames_of_every_size_are_scattered() {
 
 #[test]
 fn what_cannot_be_kept_is_refused() {
-    for bad in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-4] {
+    for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         let error = Plan::new(&[Profile::SKIN], bad).unwrap_err();
-        assert_eq!(error.input, "max_error");
+        assert!(error.to_string().starts_with("max_error: "), "{error}");
     }
-    assert_eq!(Plan::new(&[], 0.01).unwrap_err().input, "profiles");
-    let g = View::orthographic([8, 8], 4.0).shoot(|_, _| None);
-    let two = [Profile::SKIN; 2];
-    g.render(&two, TextureFormat::Rgba16Float, |frame, _| {
-        let format = TextureFormat::Rgba16Float;
-        let mut effect = PlannedScreenSpace::new(&gpu().device, format).unwrap();
-        let error = effect.prepare(&gpu().device, &gpu().queue, frame, &plans()[0]);
-        assert_eq!(error.unwrap_err().input, "plan");
-    });
+    // What no pyramid keeps is told, with what can be kept.
+    let error = Plan::new(&[Profile::SKIN], 1e-4).unwrap_err();
+    let Error::MaxError { got, reachable } = error else {
+        panic!("{error}");
+    };
+    assert!(got == 1e-4 && reachable > 1e-4, "{error}");
+    assert!(Plan::new(&[Profile::SKIN], 1.01 * reachable).is_ok());
+    let error = Plan::new(&[], 0.01).unwrap_err();
+    assert!(error.to_string().starts_with("profiles: "), "{error}");
 }

@@ -2,24 +2,16 @@
 //!
 //! Inputs are the same on every run; `PROPTEST_CASES` and `PROPTEST_RNG_SEED` look further.
 
-#[path = "common/damage.rs"]
-mod damage;
-#[path = "common/model.rs"]
-#[allow(dead_code)] // Other users change more of it.
-mod model;
-
 use glam::Vec3;
 use image::ImageFormat;
 use proptest::collection::vec;
 use proptest::num::f32::ANY;
 use proptest::prelude::*;
-use subsurface::renderer::Scene;
 use subsurface::{DEFAULT_MAX_ERROR, Gaussian, Plan, Profile};
+use subsurface_lab::renderer::Scene;
 
-use damage::{Damage, Lie, config};
-use model::{Model, flaw_of_profile, flaw_of_scene, glb, picture};
-
-const HEAD: &[u8] = include_bytes!("../examples/compare/head.glb");
+use subsurface_lab::damage::{Damage, Lie, config};
+use subsurface_lab::model::{Model, flaw_of_profile, flaw_of_scene, glb, picture};
 
 /// A picture's size is known before its pixels are, and so is that it does not fit.
 #[test]
@@ -27,7 +19,7 @@ fn images_are_refused_before_they_are_decoded() {
     let mut jpeg = picture(ImageFormat::Jpeg);
     let frame = jpeg.windows(2).position(|w| w == [0xff, 0xc0]).unwrap();
     jpeg[frame + 5..frame + 9].fill(255);
-    let mut model = Model::new();
+    let mut model = Model::default();
     model.set_picture(&jpeg);
     let error = Scene::from_glb(&model.glb()).unwrap_err();
     assert_eq!(error.input, "glTF, image 0");
@@ -67,7 +59,7 @@ proptest! {
         lies in vec(any::<Lie>(), 1..4),
         damage in vec(any::<Damage>(), 0..3),
     ) {
-        let mut model = Model::new();
+        let mut model = Model::default();
         lies.iter().for_each(|lie| lie.tell(&mut model.json));
         damage.iter().for_each(|damage| damage.apply(&mut model.bytes));
         scene(&model.glb())?;
@@ -75,7 +67,7 @@ proptest! {
 
     #[test]
     fn a_damaged_model_is_a_scene_or_an_error(damage in vec(any::<Damage>(), 1..6)) {
-        let mut bytes = Model::new().glb();
+        let mut bytes = Model::default().glb();
         damage.iter().for_each(|damage| damage.apply(&mut bytes));
         scene(&bytes)?;
     }
@@ -137,7 +129,7 @@ proptest! {
         near in vec(any::<Damage>(), 0..3),
         far in vec(any::<Damage>(), 0..3),
     ) {
-        let mut bytes = HEAD.to_vec();
+        let mut bytes = subsurface_lab::HEAD.to_vec();
         // Headers and JSON are a small part of it, and the more delicate.
         let mut first = bytes[..4096].to_vec();
         near.iter().for_each(|damage| damage.apply(&mut first));

@@ -1,12 +1,11 @@
 //! The texture-space path against closed forms.
 
-mod common;
-
-use common::*;
 use glam::{DVec2, DVec3};
-use subsurface::truth::closed_form::{scattered_cosine, scattered_step, step};
 use subsurface::wgpu::TextureFormat;
 use subsurface::{Atlas, Profile, TextureSpace};
+use subsurface_lab::method;
+use subsurface_lab::synthetic::*;
+use subsurface_lab::truth::closed_form::{scattered_cosine, scattered_step, step};
 
 /// Position in mm and irradiance of a texel; `None` off the islands.
 type Texel = Option<(DVec3, DVec3)>;
@@ -27,19 +26,13 @@ fn scatter(size: u32, profile: &Profile, texel: impl Fn(DVec2) -> Texel) -> Vec<
     }
     let format = TextureFormat::Rgba32Float;
     let output = gpu.target("output", [size; 2], format);
-    let mut path = TextureSpace::new(&gpu.device, format).unwrap();
-    path.prepare(
-        &gpu.device,
-        &Atlas {
-            irradiance: &gpu.upload("irradiance", [size; 2], format, &irradiance),
-            positions: &gpu.upload("positions", [size; 2], format, &positions),
-            output: &output,
-            mm_per_unit: 1000.0,
-            profiles: &[*profile],
-        },
-    )
-    .unwrap();
-    gpu.run(|encoder| path.render(encoder));
+    let mut path = TextureSpace::new(&gpu.device, format, &[*profile]).unwrap();
+    let atlas = Atlas {
+        irradiance: &gpu.upload("irradiance", [size; 2], format, &irradiance),
+        positions: &gpu.upload("positions", [size; 2], format, &positions),
+        mm_per_unit: 1000.0,
+    };
+    method::scatter_atlas(gpu, &mut path, &atlas, &output).unwrap();
     gpu.read(&output)
         .iter()
         .map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into()))

@@ -1,17 +1,15 @@
 //! The truths against closed forms, and against each other.
 
-mod common;
-
 use std::f64::consts::{PI, TAU};
 
-use common::*;
 use glam::{DMat3, DVec3, Vec3};
 use subsurface::Profile;
-use subsurface::truth::closed_form::{
+use subsurface_lab::synthetic::*;
+use subsurface_lab::truth::closed_form::{
     legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_cosine_around,
     scattered_spot, scattered_step, step, through_slab,
 };
-use subsurface::truth::{Patch, Place, SurfaceIntegral, Triangles, surface_integral};
+use subsurface_lab::truth::{Patch, Place, SurfaceIntegral, Triangles, surface_integral};
 
 /// What a truth may be off by.
 const EXACT: f64 = 0.0005;
@@ -169,8 +167,9 @@ fn disc(r: f64, radius: f64, v: f64) -> f64 {
 
 fn scattered_disc(r: f64, radius: f64, blur_mm2: f64) -> DVec3 {
     let gaussians = Profile::SKIN.gaussians().iter();
-    let terms = gaussians
-        .map(|g| g.weight.as_dvec3() * disc(r, radius, f64::from(g.variance_mm2) + blur_mm2));
+    let terms = gaussians.map(|g| {
+        DVec3::from(g.weight.map(f64::from)) * disc(r, radius, f64::from(g.variance_mm2) + blur_mm2)
+    });
     terms.sum()
 }
 
@@ -271,7 +270,7 @@ fn the_surface_integral_knows_a_cylinder() {
                 mass += w;
             }
             let unit = TAU / STEPS as f64 * rho_mm / (TAU * v).sqrt();
-            g.weight.as_dvec3()
+            DVec3::from(g.weight.map(f64::from))
                 * if normalised {
                     light / mass
                 } else {
@@ -311,7 +310,7 @@ fn the_surface_integral_knows_layers_and_a_slab_lit_from_behind() {
             let terms = Profile::SKIN.gaussians().iter().map(|g| {
                 let v = f64::from(g.variance_mm2);
                 let through = (-gap_mm * gap_mm / (2.0 * v)).exp();
-                g.weight.as_dvec3() * through / (step(-x, v) + through)
+                DVec3::from(g.weight.map(f64::from)) * through / (step(-x, v) + through)
             });
             terms.sum()
         };
@@ -515,7 +514,7 @@ fn waves_and_spots_are_what_a_sum_over_the_plane_makes_of_them() {
     let scattered = |light: &dyn Fn(f64, f64) -> f64| -> DVec3 {
         let gaussians = profile.gaussians().iter();
         gaussians
-            .map(|g| g.weight.as_dvec3() * sum(light, g.variance_mm2.into()))
+            .map(|g| DVec3::from(g.weight.map(f64::from)) * sum(light, g.variance_mm2.into()))
             .sum()
     };
     let wave = scattered(&|x, _| (0.9 * x).cos());
@@ -547,7 +546,7 @@ fn harmonics_are_what_a_sum_over_the_sphere_makes_of_them() {
     };
     let gaussians = profile.gaussians().iter();
     let summed: DVec3 = gaussians
-        .map(|g| g.weight.as_dvec3() * mean(g.variance_mm2.into()))
+        .map(|g| DVec3::from(g.weight.map(f64::from)) * mean(g.variance_mm2.into()))
         .sum();
     let closed = passed_harmonics(rho_mm, degree + 1, &profile)[degree];
     assert!(

@@ -8,7 +8,7 @@
 //! - KHR_materials_volume and the draft of KHR_materials_volume_scatter, Khronos.
 
 use super::medium::G_RANGE;
-use super::{Layer, Medium, Response};
+use super::{Layer, Medium, Response, number};
 use crate::Error;
 
 /// How Burley's width follows from albedo and distance: l/d = s(A).
@@ -23,13 +23,13 @@ pub enum Burley {
 }
 
 impl Burley {
-    /// R(r) = A(e^−r/d + e^−r/3d)/(8πdr) for an albedo A, above 0 and at most 1, and a distance in mm.
+    /// R(r) = A(e^−r/d + e^−r/3d)/(8πdr) for an albedo A, above 0 and at most 0.999, and a distance in mm.
     ///
     /// # Errors
     /// An albedo or a distance out of its range.
     pub fn response(self, albedo: f64, distance_mm: f64) -> Result<Response, Error> {
-        check("albedo", albedo, 1.0)?;
-        check("distance_mm", distance_mm, 1e12)?;
+        check_albedo("albedo", albedo)?;
+        check_length("distance_mm", distance_mm)?;
         let d = distance_mm / self.scale(albedo);
         // What leaves within r.
         let within =
@@ -57,15 +57,31 @@ impl Burley {
     }
 }
 
-/// A number above 0.
-fn check(name: &str, value: f64, most: f64) -> Result<(), Error> {
-    if !(value > 0.0 && value <= most) {
-        let needs = format!("above 0, at most {most}");
-        return Err(Error::new(
+fn check_albedo(name: &str, albedo: f64) -> Result<(), Error> {
+    if !(albedo > 0.0 && albedo <= 0.999) {
+        return Err(number(
             format!("artist: {name}"),
-            value.to_string(),
-            needs,
+            albedo,
+            "above 0, at most 0.999",
         ));
+    }
+    Ok(())
+}
+
+fn check_length(name: &str, mm: f64) -> Result<(), Error> {
+    if !(mm > 0.0 && mm <= 1e12) {
+        return Err(number(
+            format!("artist: {name}"),
+            mm,
+            "above 0, at most 1e12 mm",
+        ));
+    }
+    Ok(())
+}
+
+fn check_g(g: f64) -> Result<(), Error> {
+    if !G_RANGE.contains(&g) {
+        return Err(number("artist: g", g, "-0.5 to 0.99"));
     }
     Ok(())
 }
@@ -83,19 +99,12 @@ fn single_albedo(a: f64) -> f64 {
 /// # Errors
 /// An albedo out of 0 to 0.999; a length that is not above 0.
 pub fn random_walk(albedo: f64, mean_free_path_mm: f64, g: f64) -> Result<Medium, Error> {
-    check("albedo", albedo, 0.999)?;
-    check("mean_free_path_mm", mean_free_path_mm, 1e12)?;
+    check_albedo("albedo", albedo)?;
+    check_length("mean_free_path_mm", mean_free_path_mm)?;
     check_g(g)?;
     let alpha = single_albedo(albedo);
     let layer = Layer::isotropic((1.0 - alpha) / mean_free_path_mm, alpha / mean_free_path_mm);
     Medium::homogeneous(layer.with_g(g), 1.0)
-}
-
-fn check_g(g: f64) -> Result<(), Error> {
-    if !G_RANGE.contains(&g) {
-        return Err(Error::new("artist: g", g.to_string(), "-0.5 to 0.99"));
-    }
-    Ok(())
 }
 
 /// The mean free path in mm of Blender's Principled BSDF ("Random Walk", "Burley"), for one colour of its
@@ -110,8 +119,8 @@ pub fn blender_mean_free_path_mm(radius: f64, scale: f64) -> f64 {
 /// # Errors
 /// An albedo out of 0 to 0.999, a radius that is not above 0, an index out of 1 to 3.
 pub fn blender_skin(albedo: f64, radius_mm: f64, eta: f64, g: f64) -> Result<Medium, Error> {
-    check("albedo", albedo, 0.999)?;
-    check("radius_mm", radius_mm, 1e12)?;
+    check_albedo("albedo", albedo)?;
+    check_length("radius_mm", radius_mm)?;
     check_g(g)?;
     // The dipole's albedo rises with α′.
     let (mut least, mut most) = (0.0, 1.0);
@@ -153,9 +162,12 @@ impl VolumeScatter {
     /// # Errors
     /// A value out of its range.
     pub fn medium(&self) -> Result<Medium, Error> {
-        check("multiscatterColor", self.multiscatter, 0.999)?;
-        check("attenuationColor", self.attenuation, 1.0 - 1e-9)?;
-        check("attenuationDistance", self.attenuation_distance_m, 1e9)?;
+        check_albedo("multiscatterColor", self.multiscatter)?;
+        if !(self.attenuation > 0.0 && self.attenuation < 1.0) {
+            let needs = "above 0 and below 1";
+            return Err(number("artist: attenuationColor", self.attenuation, needs));
+        }
+        check_length("attenuationDistance", 1000.0 * self.attenuation_distance_m)?;
         check_g(self.anisotropy)?;
         let sigma_t = -self.attenuation.ln() / (1000.0 * self.attenuation_distance_m);
         let alpha = single_albedo(self.multiscatter);

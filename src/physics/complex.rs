@@ -4,29 +4,29 @@ use std::ops::{Add, AddAssign, Mul, Sub};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Complex {
-    pub re: f64,
-    pub im: f64,
+    pub(super) re: f64,
+    pub(super) im: f64,
 }
 
 impl Complex {
-    pub const ONE: Self = Self::new(1.0, 0.0);
+    pub(super) const ONE: Self = Self::new(1.0, 0.0);
 
-    pub const fn new(re: f64, im: f64) -> Self {
+    pub(super) const fn new(re: f64, im: f64) -> Self {
         Self { re, im }
     }
 
-    pub fn norm_squared(self) -> f64 {
+    pub(super) fn norm_squared(self) -> f64 {
         self.re * self.re + self.im * self.im
     }
 
     /// 1/x.
-    pub fn recip(self) -> Self {
+    pub(super) fn recip(self) -> Self {
         let n = self.norm_squared();
         Self::new(self.re / n, -self.im / n)
     }
 
     /// e^−x; 0 where that is less than the least number.
-    pub fn exp_neg(self) -> Self {
+    pub(super) fn exp_neg(self) -> Self {
         if self.re > 745.0 {
             return Self::default();
         }

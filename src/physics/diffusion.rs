@@ -32,8 +32,11 @@ impl Diffusion {
     /// A medium of more than one layer.
     pub fn response(self, medium: &Medium) -> Result<Response, Error> {
         let [layer] = medium.layers() else {
-            let got = format!("{} layers", medium.layers().len());
-            return Err(Error::new("diffusion: medium", got, "one layer"));
+            return Err(Error::Count {
+                input: "diffusion: layers",
+                got: medium.layers().len(),
+                needs: [1, 1],
+            });
         };
         let free = 1.0 / layer.sigma_t_reduced();
         let boundary = Boundary::new(medium.eta());

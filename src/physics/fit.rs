@@ -5,9 +5,9 @@
 //! - G. H. Golub & V. Pereyra, *The differentiation of pseudo-inverses and nonlinear least squares problems
 //!   whose variables separate*, SIAM J. Numer. Anal. 10, 1973: variances by descent, weights by least squares.
 
-use super::Response;
 use super::response::step;
-use crate::plan::nnls::{minimax, nnls};
+use super::{Response, number};
+use crate::plan::minimax::{minimax, nnls};
 use crate::{Error, Gaussian, Profile};
 
 /// The nearest to a line of light, in mm, that a fit looks: on skin, nobody sees less.
@@ -43,8 +43,11 @@ impl Fit {
     /// A number of Gaussians out of its range; a response whose albedo is not above 0.
     pub fn new(responses: &[Response; 3], gaussians: usize) -> Result<Self, Error> {
         if !(1..=Profile::MAX_GAUSSIANS).contains(&gaussians) {
-            let needs = format!("1 to {}", Profile::MAX_GAUSSIANS);
-            return Err(Error::new("fit: gaussians", gaussians.to_string(), needs));
+            return Err(Error::Count {
+                input: "fit: gaussians",
+                got: gaussians,
+                needs: [1, Profile::MAX_GAUSSIANS],
+            });
         }
         let target = Target::new(responses)?;
         target.fit(gaussians, target.floor(), f64::INFINITY)
@@ -57,8 +60,7 @@ impl Fit {
     /// An error that is not above 0; a response whose albedo is not above 0.
     pub fn within(responses: &[Response; 3], max_error: f64) -> Result<Self, Error> {
         if max_error.is_nan() || max_error <= 0.0 {
-            let needs = "a number above 0";
-            return Err(Error::new("fit: max_error", max_error.to_string(), needs));
+            return Err(number("fit: max_error", max_error, "a number above 0"));
         }
         let target = Target::new(responses)?;
         let floor = target.floor();
@@ -114,7 +116,7 @@ impl Target {
         for (name, albedo) in ["red", "green", "blue"].into_iter().zip(albedo) {
             if albedo.is_nan() || albedo <= 0.0 {
                 let input = format!("fit: albedo of the response to {name} light");
-                return Err(Error::new(input, albedo.to_string(), "a number above 0"));
+                return Err(number(input, albedo, "a number above 0"));
             }
         }
         let lacks = |x: f64| {
@@ -201,37 +203,25 @@ impl Target {
                 albedo: self.albedo,
             })
         };
-        let mut best: Option<Fit> = None;
-        for narrowest in [1.0, 2.5] {
+        let fit = |narrowest: f64| {
             let (low, high) = (narrowest * self.x_mm[0], last / 5.0);
-            let share = |j: usize| {
-                if gaussians == 1 {
-                    0.7
-                } else {
-                    j as f64 / (gaussians - 1) as f64
-                }
-            };
-            let sigma = |j: usize| low * (high.max(low) / low).powf(share(j));
+            let steps = (gaussians - 1).max(1) as f64;
+            let sigma = |j: usize| low * (high.max(low) / low).powf(j as f64 / steps);
             let mut state = search.start((0..gaussians).map(|j| 2.0 * sigma(j).ln()).collect());
             let mut fit = see(&state.point)?;
             // Sharpened, a fit of least squares is better by a third, never by half.
-            let rounds = if fit.excess() > 2.0 * hopeless {
-                0
-            } else {
-                ROUNDS
-            };
-            for _ in 0..rounds {
+            let hopeless = fit.excess() > 2.0 * hopeless;
+            for _ in 0..if hopeless { 0 } else { ROUNDS } {
                 search.sharpen(&mut state, floor);
                 let next = see(&state.point)?;
                 if next.excess() < fit.excess() {
                     fit = next;
                 }
             }
-            if best.is_none_or(|best| fit.excess() < best.excess()) {
-                best = Some(fit);
-            }
-        }
-        best.ok_or_else(|| Error::new("fit", "no profile", "step edges that are numbers"))
+            Ok(fit)
+        };
+        let (a, b) = (fit(1.0)?, fit(2.5)?);
+        Ok(if b.excess() < a.excess() { b } else { a })
     }
 }
 
@@ -252,7 +242,7 @@ impl Point {
         let weight = |c: usize, j: usize| self.weights[c][j] as f32;
         let gaussian = |(j, log): (usize, &f64)| Gaussian {
             variance_mm2: log.exp().min(f64::from(f32::MAX)) as f32,
-            weight: [weight(0, j), weight(1, j), weight(2, j)].into(),
+            weight: [weight(0, j), weight(1, j), weight(2, j)],
         };
         self.log_variances
             .iter()

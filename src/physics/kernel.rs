@@ -15,18 +15,18 @@ use super::quadrature::Direction;
 #[derive(Clone, Copy, Default)]
 pub(super) struct Ray {
     /// What passes the whole cell: e^−x.
-    pub pass: Complex,
+    pub(super) pass: Complex,
     /// Mean and slope.
     parts: [Complex; 2],
     /// Both times what passes all cells above.
-    pub top: [Complex; 2],
+    pub(super) top: [Complex; 2],
     /// Within the cell, one way, as [`Kernel::own`].
     own: [Complex; 4],
 }
 
 impl Ray {
     /// The ray of `through` what passes all cells above.
-    pub fn new(x: Complex, through: Complex) -> Self {
+    pub(super) fn new(x: Complex, through: Complex) -> Self {
         let pass = x.exp_neg();
         // Mean, slope, mean to mean, slope to mean and slope to slope.
         let mut parts = [Complex::default(); 5];
@@ -96,7 +96,7 @@ fn terms<const B: usize>() -> impl Iterator<Item = [usize; 4]> {
 }
 
 impl<const B: usize, const P: usize> Kernel<B, P> {
-    pub fn new(basis: [(usize, usize); B], cells: usize) -> Self {
+    pub(super) fn new(basis: [(usize, usize); B], cells: usize) -> Self {
         let odd = |&(b, b2): &(usize, usize)| (basis[b].1 + basis[b2].1) % 2 == 1;
         let mut list: Vec<_> = (0..B).flat_map(|b| (b..B).map(move |b2| (b, b2))).collect();
         list.sort_by_key(odd);
@@ -119,7 +119,7 @@ impl<const B: usize, const P: usize> Kernel<B, P> {
     }
 
     /// Adds rays along a direction with harmonics `y`, which is this share of all solid angles.
-    pub fn add(&mut self, rays: &[Ray], y: [f64; B], share: f64, direction: &Direction) {
+    pub(super) fn add(&mut self, rays: &[Ray], y: [f64; B], share: f64, direction: &Direction) {
         // Re(i^(m′−m)·a) is Re a or Im a, but for its sign.
         let (one, i) = (Complex::ONE, Complex::new(0.0, 1.0));
         let weights: [f64; P] = std::array::from_fn(|k| {
@@ -169,7 +169,7 @@ impl<const B: usize, const P: usize> Kernel<B, P> {
 
     /// The matrix K, row by row, of unknowns by cell, part and harmonic; `scatters` is how much of degree l a
     /// cell scatters.
-    pub fn matrix(&self, scatters: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+    pub(super) fn matrix(&self, scatters: impl Fn(usize, usize) -> f64) -> Vec<f64> {
         let size = self.emitted.len();
         let index = |cell: usize, part: usize, b: usize| (cell * 2 + part) * B + b;
         let mut k = vec![0.0; size * size];
@@ -201,7 +201,7 @@ impl<const B: usize, const P: usize> Kernel<B, P> {
     }
 
     /// What leaves the surface of each unknown.
-    pub fn emitted(&self, scatters: impl Fn(usize, usize) -> f64) -> Vec<f64> {
+    pub(super) fn emitted(&self, scatters: impl Fn(usize, usize) -> f64) -> Vec<f64> {
         let leaves = |(i, e): (usize, &f64)| e * scatters(i / (2 * B), self.basis[i % B].0);
         self.emitted.iter().enumerate().map(leaves).collect()
     }

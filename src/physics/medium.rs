@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use super::number;
 use crate::Error;
 
 /// Scattering that is more backward than this is more than [`Transport`](super::Transport) resolves.
@@ -93,24 +94,19 @@ impl Medium {
     /// than 10⁻⁶ of what it scatters; no layer that scatters.
     pub fn new(layers: &[Layer], eta: f64) -> Result<Self, Error> {
         if !(1.0..=3.0).contains(&eta) {
-            return Err(Error::new("medium: eta", eta.to_string(), "1 to 3"));
+            return Err(number("medium: eta", eta, "1 to 3"));
         }
         if !(1..=Self::MAX_LAYERS).contains(&layers.len()) {
-            let needs = format!("1 to {}", Self::MAX_LAYERS);
-            return Err(Error::new(
-                "medium: layers",
-                layers.len().to_string(),
-                needs,
-            ));
+            return Err(Error::Count {
+                input: "medium: layers",
+                got: layers.len(),
+                needs: [1, Self::MAX_LAYERS],
+            });
         }
         let last = layers.len() - 1;
         for (i, layer) in layers.iter().enumerate() {
-            let refuse = |field: &str, got: f64, needs: &str| {
-                Err(Error::new(
-                    format!("medium: {field} of layer {i}"),
-                    got.to_string(),
-                    needs,
-                ))
+            let refuse = |field: &str, got: f64, needs: &'static str| {
+                Err(number(format!("medium: {field} of layer {i}"), got, needs))
             };
             // What sums and squares of these stay far within a float.
             const RANGE: RangeInclusive<f64> = 0.0..=1e12;
@@ -155,11 +151,8 @@ impl Medium {
             .filter(|l| l.thickness_mm > 0.0)
             .collect();
         if layers.iter().all(|l| l.sigma_s_per_mm == 0.0) {
-            return Err(Error::new(
-                "medium: sigma_s_per_mm",
-                "0 in every layer",
-                "a layer that scatters",
-            ));
+            let needs = "a number above 0 in one of them";
+            return Err(number("medium: sigma_s_per_mm of all layers", 0.0, needs));
         }
         Ok(Self { layers, eta })
     }

@@ -7,7 +7,7 @@
 //! - S. Prahl, *Optical absorption of hemoglobin*, Oregon Medical Laser Center 1999: the table below.
 
 use super::medium::G_RANGE;
-use super::{Layer, Medium, Response, Transport};
+use super::{Layer, Medium, Response, Transport, number};
 use crate::Error;
 
 /// A skin.
@@ -92,15 +92,11 @@ impl Skin {
             ("epidermis_mm", self.epidermis_mm),
         ] {
             if !(0.0..=1.0).contains(&value) {
-                return Err(Error::new(
-                    format!("skin: {name}"),
-                    value.to_string(),
-                    "0 to 1",
-                ));
+                return Err(number(format!("skin: {name}"), value, "0 to 1"));
             }
         }
         if !G_RANGE.contains(&self.g) {
-            return Err(Error::new("skin: g", self.g.to_string(), "-0.5 to 0.99"));
+            return Err(number("skin: g", self.g, "-0.5 to 0.99"));
         }
         SPECTRUM
             .iter()

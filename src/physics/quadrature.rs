@@ -47,11 +47,11 @@ pub(super) fn fresnel(inside: f64, outside: f64, eta: f64) -> f64 {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Direction {
     /// cos θ.
-    pub mu: f64,
+    pub(super) mu: f64,
     /// Its share of ∫₀¹dμ.
-    pub weight: f64,
+    pub(super) weight: f64,
     /// The Fresnel reflectance from inside.
-    pub fresnel: f64,
+    pub(super) fresnel: f64,
 }
 
 /// Directions over the hemisphere, `n` to either side of the critical angle. They cluster at its ends, where

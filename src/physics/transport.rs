@@ -17,9 +17,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use super::complex::Complex;
 use super::kernel::{Kernel, Ray, harmonics, solve};
 use super::quadrature::{Direction, directions, fresnel, gauss, henyey_greenstein};
-use super::{Layer, Medium, Response};
+use super::{Layer, Medium, Response, number};
 use crate::Error;
-use crate::plan::nnls::nnls;
+use crate::plan::minimax::nnls;
 
 /// How light comes in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,11 +76,7 @@ impl Transport {
         let albedo = zero.sum();
         if albedo.is_nan() || albedo <= 0.0 {
             let needs = "layers that send light back";
-            return Err(Error::new(
-                "medium",
-                format!("an albedo of {albedo}"),
-                needs,
-            ));
+            return Err(number("medium: albedo", albedo, needs));
         }
         let (low, high) = solver.frequencies();
         let steps = ((high / low).log10() * FREQUENCIES).ceil() as usize;
@@ -110,11 +106,7 @@ impl Transport {
     pub fn transform(&self, medium: &Medium, s_per_mm: f64) -> Result<f64, Error> {
         if !(0.0..=1e15).contains(&s_per_mm) {
             let needs = "a number of rad/mm, 0 to 1e15";
-            return Err(Error::new(
-                "transport: s_per_mm",
-                s_per_mm.to_string(),
-                needs,
-            ));
+            return Err(number("transport: s_per_mm", s_per_mm, needs));
         }
         Ok(Solver::new(self, medium)?.solve(s_per_mm).sum())
     }
@@ -249,7 +241,7 @@ impl Solver {
         }: &Transport,
         medium: &Medium,
     ) -> Result<Self, Error> {
-        let refuse = |needs| Err(Error::new("transport: order", order.to_string(), needs));
+        let refuse = |needs| Err(number("transport: order", order as f64, needs));
         if order > 2 {
             return refuse("0, 1 or 2");
         }

@@ -1,8 +1,8 @@
 //! The plan: what work keeps a stated error.
 
+mod edge_response;
 mod kernels;
-pub(crate) mod nnls;
-mod response;
+pub(crate) mod minimax;
 mod weights;
 
 use std::fmt;
@@ -10,7 +10,7 @@ use std::ops::RangeInclusive;
 
 use glam::Vec3;
 
-use crate::{Error, Profile};
+use crate::{Error, Profile, validate};
 use kernels::KERNELS;
 pub(crate) use kernels::{Kinds, Shape, own_blur};
 pub(crate) use weights::Weights;
@@ -66,19 +66,30 @@ impl Plan {
     /// No profile, or more than [`MAX_PROFILES`](crate::MAX_PROFILES); a `max_error` that is not a
     /// number above 0, or less than the exact effect has.
     pub fn new(profiles: &[Profile], max_error: f32) -> Result<Self, Error> {
-        crate::input::check_profiles(profiles)?;
-        if !max_error.is_finite() || max_error < EXACT_ERROR {
-            return Err(Error::new(
-                "max_error",
-                max_error.to_string(),
-                format!("a finite number from {EXACT_ERROR} on"),
-            ));
+        validate::profiles(profiles)?;
+        if !max_error.is_finite() || max_error <= 0.0 {
+            return Err(Error::Number {
+                input: "max_error".into(),
+                got: max_error.into(),
+                needs: "a finite number above 0, in units of white",
+            });
         }
-        let mut fits = KERNELS.into_iter();
-        Ok(Self {
-            max_error,
-            profiles: profiles.to_vec(),
-            weights: fits.find_map(|kernels| Weights::new(profiles, max_error, kernels)),
+        let mut reachable = f32::INFINITY;
+        for kernels in KERNELS {
+            match Weights::new(profiles, max_error, kernels) {
+                Ok(weights) => {
+                    return Ok(Self {
+                        max_error,
+                        profiles: profiles.to_vec(),
+                        weights: Some(weights),
+                    });
+                }
+                Err(error) => reachable = reachable.min(error),
+            }
+        }
+        Err(Error::MaxError {
+            got: max_error,
+            reachable,
         })
     }
 
@@ -87,7 +98,7 @@ impl Plan {
     /// # Errors
     /// No profile, or more than [`MAX_PROFILES`](crate::MAX_PROFILES).
     pub fn exact(profiles: &[Profile]) -> Result<Self, Error> {
-        crate::input::check_profiles(profiles)?;
+        validate::profiles(profiles)?;
         Ok(Self {
             max_error: EXACT_ERROR,
             profiles: profiles.to_vec(),

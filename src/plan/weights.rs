@@ -3,9 +3,9 @@
 use glam::{DVec3, Vec3, Vec4};
 
 use super::Row;
+use super::edge_response::Responses;
 use super::kernels::Kernels;
-use super::nnls;
-use super::response::Responses;
+use super::minimax::minimax;
 use crate::Profile;
 
 /// Rows to an octave of scale; between two of them weights are interpolated.
@@ -31,8 +31,9 @@ pub(crate) struct Weights {
 }
 
 impl Weights {
-    /// Those of these kernels whose error is the least; `None` where it is more than `max_error`.
-    pub fn new(profiles: &[Profile], max_error: f32, kernels: Kernels) -> Option<Self> {
+    /// Those of these kernels whose error is the least. Where that is more than `max_error` at some scale, the
+    /// largest error.
+    pub fn new(profiles: &[Profile], max_error: f32, kernels: Kernels) -> Result<Self, f32> {
         let responses = Responses::new(&kernels, FITTED_LEVELS);
         let widths = || profiles.iter().map(widest_mm).filter(|w| *w > 0.0);
         let (widest, narrowest) = (
@@ -52,11 +53,13 @@ impl Weights {
             let scale = |row: f64| f64::exp2(first + row / ROWS_PER_OCTAVE);
             let mut fitted = Vec::new();
             for i in 0..rows {
-                let row = fit_row(&responses, &kernels, profile, scale(i as f64), max_error);
-                if row.predicted_error > max_error {
-                    return None;
-                }
-                fitted.push(row);
+                fitted.push(fit_row(
+                    &responses,
+                    &kernels,
+                    profile,
+                    scale(i as f64),
+                    max_error,
+                ));
             }
             for i in 0..rows - 1 {
                 let mean: Vec<Vec3> = fitted[i]
@@ -74,14 +77,14 @@ impl Weights {
                 let next = fitted[i + 1].predicted_error;
                 fitted[i].predicted_error = fitted[i].predicted_error.max(next);
             }
-            Some(fitted)
+            fitted
         };
         let mut fitted: Vec<Vec<Row>> = Vec::new();
         for (i, profile) in profiles.iter().enumerate() {
             // Several heads may well have the same skin.
             let rows = match profiles[..i].iter().position(|p| p == profile) {
                 Some(same) => fitted[same].clone(),
-                None => fit(profile)?,
+                None => fit(profile),
             };
             fitted.push(rows);
         }
@@ -93,7 +96,12 @@ impl Weights {
         };
         weights.extend(max_error);
         weights.find_levels();
-        (weights.predicted_error() <= max_error).then_some(weights)
+        let error = weights.predicted_error();
+        if error <= max_error {
+            Ok(weights)
+        } else {
+            Err(error)
+        }
     }
 
     /// Goes on beyond the scales that were fitted, to where the last level is used up: a profile of twice the
@@ -295,7 +303,7 @@ fn fit_columns(
         .collect();
     let mut weights = vec![Vec3::ZERO; responses.columns[0].len()];
     for (channel, wanted) in wanted.iter().enumerate() {
-        let fit = nnls::minimax(&columns, wanted).0;
+        let fit = minimax(&columns, wanted).0;
         for (i, weight) in used.iter().zip(fit) {
             weights[*i][channel] = weight as f32;
         }

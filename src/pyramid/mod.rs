@@ -5,46 +5,44 @@ mod passes;
 mod scratch;
 
 use wgpu::{
-    BindGroup, BindGroupLayout, Buffer, CommandEncoder, Device, Queue, Sampler, TextureFormat,
+    BindGroup, BindGroupLayout, BindingResource, Buffer, Device, Queue, Sampler, TextureFormat,
     TextureView,
 };
 
-use crate::frame::{NormalSettings, Optics, Viewport};
-use crate::gaussian_sum::{begin, filled, scratch_view};
+use crate::frame::Viewport;
+use crate::gpu::{self, Recorder};
+use crate::optics::Optics;
 use crate::plan::Weights;
-use crate::{Output, ScreenFrame};
-use passes::{Compute, Draw, LIGHT, Passes, Shaders};
-use scratch::{COLUMNS, DRAW_BYTES, LevelScratch, Scratch, View};
+use crate::{Error, Frame, Output};
+use passes::{Compute, LIGHT, OverTiles, Passes};
+use scratch::{COLUMNS, DRAW_BYTES, LevelScratch, Scratch};
 
-/// What a frame hands over, already checked.
-pub(crate) struct Inputs<'a> {
-    pub frame: &'a ScreenFrame<'a>,
-    pub optics: Optics,
-    pub plan: &'a Weights,
-}
-
-/// The passes, and what they need for the frame that was last prepared.
+/// The passes of a plan, and its weights.
+#[derive(Debug)]
 pub(crate) struct Pyramid {
     output: Output,
-    shaders: Shaders,
-    linear: Sampler,
-    /// Bound where a frame has no ids.
-    no_id: TextureView,
-    planned: Option<Planned>,
-    scratch: Option<Scratch>,
-    frame: Option<Frame>,
-}
-
-/// What follows from the plan.
-struct Planned {
     plan: Weights,
     weights: Buffer,
     passes: Passes,
+    linear: Sampler,
+    /// Bound where a frame has no ids.
+    no_id: TextureView,
+    /// Bound where there is no coarser level.
+    no_mean: TextureView,
 }
 
-/// The groups of one frame.
-struct Frame {
-    views: Views,
+/// What one view needs, and the groups of its last frame.
+#[derive(Debug)]
+pub(crate) struct PyramidView {
+    scratch: Scratch,
+    groups: Option<Groups>,
+}
+
+#[derive(Debug)]
+struct Groups {
+    /// The weights of the plan that they bind.
+    weights: Buffer,
+    read: Textures,
     viewport: Option<Viewport>,
     mark: BindGroup,
     gather: Vec<BindGroup>,
@@ -57,62 +55,92 @@ struct Frame {
 }
 
 /// What is bound of a host's.
-#[derive(Clone, PartialEq)]
-struct Views {
+#[derive(Clone, Debug, PartialEq)]
+struct Textures {
     irradiance: TextureView,
     depth: TextureView,
     profile_id: TextureView,
+    /// The irradiance where there is none; it is not looked at then.
     strength: TextureView,
-    normal: TextureView,
-    output: TextureView,
+    albedo: TextureView,
 }
 
 impl Pyramid {
-    pub fn new(device: &Device, output: Output) -> Self {
-        Self {
+    /// # Errors
+    /// A device that allows less than WebGPU's default limits.
+    pub fn new(device: &Device, output: Output, plan: &Weights) -> Result<Self, Error> {
+        let limits = device.limits();
+        for (limit, got, needs) in [
+            (
+                "max_storage_buffers_per_shader_stage",
+                limits.max_storage_buffers_per_shader_stage,
+                4,
+            ),
+            (
+                "max_compute_invocations_per_workgroup",
+                limits.max_compute_invocations_per_workgroup,
+                64,
+            ),
+            (
+                "max_compute_workgroup_size_x",
+                limits.max_compute_workgroup_size_x,
+                64,
+            ),
+        ] {
+            if got < needs {
+                return Err(Error::Limit { limit, got, needs });
+            }
+        }
+        let texture = |label, format| gpu::scratch_texture(device, label, [1, 1], format);
+        Ok(Self {
             output,
-            shaders: Shaders::new(device),
+            plan: plan.clone(),
+            weights: gpu::filled_buffer(
+                device,
+                "subsurface::pyramid weights",
+                bytemuck::cast_slice(&plan.table()),
+                wgpu::BufferUsages::STORAGE,
+            ),
+            passes: Passes::new(device, plan, output),
             linear: device.create_sampler(&wgpu::SamplerDescriptor {
-                label: Some("subsurface linear"),
+                label: Some("subsurface::pyramid linear"),
                 mag_filter: wgpu::FilterMode::Linear,
                 min_filter: wgpu::FilterMode::Linear,
                 ..Default::default()
             }),
-            no_id: scratch_view(device, "subsurface no id", [1, 1], TextureFormat::R8Uint),
-            planned: None,
-            scratch: None,
-            frame: None,
-        }
+            no_id: texture("subsurface::pyramid no id", TextureFormat::R8Uint),
+            no_mean: texture("subsurface::pyramid no mean", LIGHT),
+        })
     }
 
-    /// Uploads what the frame needs; makes anew what a new plan, size or texture asks for.
-    pub fn prepare(&mut self, device: &Device, queue: &Queue, inputs: &Inputs) {
-        let frame = inputs.frame;
-        let viewport = frame.viewport();
-        let size = viewport.size();
-        if self.planned.as_ref().is_none_or(|p| p.plan != *inputs.plan) {
-            self.scratch = None;
-            self.frame = None;
-            self.planned = Some(Planned {
-                plan: inputs.plan.clone(),
-                weights: weights(device, inputs.plan),
-                passes: Passes::new(device, &self.shaders, inputs.plan, self.output),
-            });
+    /// Bytes of scratch memory of a view of so many pixels.
+    pub fn scratch_bytes(&self, size: [u32; 2]) -> u64 {
+        scratch::bytes(size, &self.plan)
+    }
+
+    /// Uploads the numbers of a frame. Makes anew what a change of its size, or of its textures, asks for.
+    pub fn prepare(
+        &self,
+        device: &Device,
+        queue: &Queue,
+        view: &mut Option<PyramidView>,
+        frame: &Frame,
+        optics: &Optics,
+    ) {
+        let size = frame.rectangle().size();
+        if view.as_ref().is_some_and(|v| v.scratch.size != size) {
+            *view = None; // The old scratch goes before the new one comes.
         }
-        let Some(planned) = &self.planned else { return };
-        if self.scratch.as_ref().is_none_or(|s| s.size != size) {
-            self.frame = None;
-            self.scratch = None; // The old one goes before the new one comes.
-            self.scratch = Some(Scratch::new(device, queue, size, &planned.plan));
-        }
-        let Some(scratch) = &self.scratch else { return };
-        let plan = &planned.plan;
-        let optics = &inputs.optics;
-        let view = View {
+        let view = view.get_or_insert_with(|| PyramidView {
+            scratch: Scratch::new(device, queue, size, &self.plan),
+            groups: None,
+        });
+        let plan = &self.plan;
+        let numbers = scratch::View {
             has_id: u32::from(frame.profile_id.is_some()),
             has_strength: u32::from(frame.strength.is_some()),
             far: optics.far,
-            pad: 0,
+            has_albedo: u32::from(frame.albedo.is_some()),
             origin: optics.origin,
             step: optics.step,
             depth_to_mm: optics.depth_to_mm(),
@@ -120,131 +148,197 @@ impl Pyramid {
             rows: plan.row_count() as u32,
             stride: plan.stride() as u32,
             profiles: plan.profiles.len() as u32,
-            first_pixel: viewport.first(),
+            first_pixel: frame.rectangle().first(),
             size: size.into(),
         };
-        queue.write_buffer(&scratch.view, 0, bytemuck::bytes_of(&view));
-        let normals = NormalSettings::new(frame.normal);
-        queue.write_buffer(&scratch.normals, 0, bytemuck::bytes_of(&normals));
-        let views = Views {
+        queue.write_buffer(&view.scratch.view, 0, bytemuck::bytes_of(&numbers));
+        let read = Textures {
             irradiance: frame.irradiance.clone(),
             depth: frame.depth.clone(),
             profile_id: frame.profile_id.unwrap_or(&self.no_id).clone(),
-            // Not looked at where there is none.
             strength: frame.strength.unwrap_or(frame.irradiance).clone(),
-            normal: frame.normal.map_or(frame.irradiance, |n| n.texture).clone(),
-            output: frame.output.clone(),
+            albedo: frame.albedo.unwrap_or(frame.irradiance).clone(),
         };
-        match &mut self.frame {
-            Some(made) if made.views == views => made.viewport = frame.viewport,
-            made => {
-                let linear = &self.linear;
-                let groups = Frame::new(device, linear, planned, scratch, views, frame.viewport);
-                *made = Some(groups);
+        match &mut view.groups {
+            Some(groups) if groups.read == read && groups.weights == self.weights => {
+                groups.viewport = frame.viewport;
+            }
+            groups => {
+                view.scratch.set_plan(queue, plan);
+                *groups = Some(self.bind(device, &view.scratch, read, frame.viewport));
             }
         }
     }
 
-    /// Gives back what the frame that was last prepared needs.
-    pub fn forget(&mut self) {
-        self.frame = None;
-        self.scratch = None;
+    fn bind(
+        &self,
+        device: &Device,
+        scratch: &Scratch,
+        read: Textures,
+        viewport: Option<Viewport>,
+    ) -> Groups {
+        use BindingResource::{Sampler, TextureView as Texture};
+        let group = |layout: &BindGroupLayout, resources: &[(u32, BindingResource)]| {
+            gpu::group(device, "subsurface::pyramid", layout, resources)
+        };
+        let passes = &self.passes;
+        let levels = &scratch.levels;
+        let base = &levels[0];
+        let view = scratch.view.as_entire_binding();
+        let blur = |pass: &OverTiles, l: usize| {
+            // The last level has none that is coarser; it does not look.
+            let (shape, mean) = match levels.get(l + 1) {
+                Some(next) => (&next.shape, scratch.mean(l + 1)),
+                None => (&levels[l].shape, &self.no_mean),
+            };
+            let mut resources = vec![
+                (0, view.clone()),
+                (1, levels[l].settings.as_entire_binding()),
+                (2, levels[l].list.as_entire_binding()),
+                (3, self.weights.as_entire_binding()),
+                (7, Texture(&levels[l].light)),
+                (8, Texture(&levels[l].shape)),
+                (9, Texture(mean)),
+                (10, Texture(shape)),
+                (12, Sampler(&self.linear)),
+            ];
+            if l == 0 {
+                resources.push((4, Texture(&read.strength)));
+                resources.push((5, Texture(&read.albedo)));
+            }
+            group(&pass.layout, &resources)
+        };
+        let gather = |l: usize| {
+            let below = match l {
+                0 => &scratch.marked,
+                _ => &levels[l - 1].marked,
+            };
+            let resources = [
+                (5, levels[l].gathering.as_entire_binding()),
+                (6, below.as_entire_binding()),
+                (7, levels[l].marked.as_entire_binding()),
+                (8, levels[l].draws.as_entire_binding()),
+                (9, levels[l].list.as_entire_binding()),
+                (10, Texture(&base.shape)),
+            ];
+            group(&passes.gather.layout, &resources)
+        };
+        let halve = |l: usize| {
+            let resources = [
+                (0, view.clone()),
+                (1, levels[l].settings.as_entire_binding()),
+                (2, levels[l].list.as_entire_binding()),
+                (7, Texture(&levels[l - 1].light)),
+                (8, Texture(&levels[l - 1].shape)),
+                (12, Sampler(&self.linear)),
+            ];
+            group(&passes.halve.layout, &resources)
+        };
+        Groups {
+            weights: self.weights.clone(),
+            viewport,
+            mark: group(
+                &passes.mark.layout,
+                &[
+                    (0, view.clone()),
+                    (1, Texture(&read.depth)),
+                    (2, Texture(&read.profile_id)),
+                    (3, self.weights.as_entire_binding()),
+                    (4, scratch.marked.as_entire_binding()),
+                ],
+            ),
+            gather: (0..levels.len()).map(gather).collect(),
+            pack: group(
+                &passes.pack.layout,
+                &[
+                    (0, view.clone()),
+                    (1, base.settings.as_entire_binding()),
+                    (2, base.list.as_entire_binding()),
+                    (4, Texture(&read.irradiance)),
+                    (5, Texture(&read.depth)),
+                    (6, Texture(&read.profile_id)),
+                    (11, scratch.marked.as_entire_binding()),
+                ],
+            ),
+            halve: (1..levels.len()).map(halve).collect(),
+            level: (1..levels.len()).map(|l| blur(&passes.level, l)).collect(),
+            frame: blur(&passes.frame, 0),
+            copy: group(
+                &passes.copy_layout,
+                &[
+                    (0, view.clone()),
+                    (4, Texture(&read.irradiance)),
+                    (5, Texture(&read.albedo)),
+                ],
+            ),
+            read,
+        }
     }
 
-    /// Records the frame, and calls `after` with the label of each pass.
-    pub fn render(
-        &self,
-        encoder: &mut CommandEncoder,
-        after: &mut dyn FnMut(&str, &mut CommandEncoder),
-    ) {
-        let (Some(planned), Some(scratch), Some(frame)) =
-            (&self.planned, &self.scratch, &self.frame)
-        else {
+    /// Records the frame that was last prepared.
+    pub fn render(&self, recorder: &mut Recorder, view: &PyramidView, output: &TextureView) {
+        let PyramidView { scratch, groups } = view;
+        let (Some(groups), [base, coarser @ ..]) = (groups, &scratch.levels[..]) else {
             return;
         };
-        let passes = &planned.passes;
-        let [base, coarser @ ..] = &scratch.levels[..] else {
-            return;
-        };
+        let passes = &self.passes;
         for level in &scratch.levels {
-            forget_tiles(encoder, level);
+            forget_tiles(recorder, level);
         }
-        encoder.clear_buffer(&scratch.marked, 0, None);
-        let label = "subsurface tiles";
+        recorder.encoder.clear_buffer(&scratch.marked, 0, None);
         {
-            let mut pass = begin_compute(encoder, label);
+            let mut pass = recorder.dispatch("subsurface::pyramid tiles");
             pass.set_pipeline(&passes.mark.pipeline);
-            pass.set_bind_group(0, &frame.mark, &[]);
+            pass.set_bind_group(0, &groups.mark, &[]);
             pass.dispatch_workgroups(base.size[0].div_ceil(COLUMNS), base.tiles[1], 1);
             // All of the frame's; which of them are simple shows when they are packed.
-            gather(&mut pass, &passes.gather, &frame.gather[0], base);
+            gather(&mut pass, &passes.gather, &groups.gather[0], base);
         }
-        after(label, encoder);
-        let label = "subsurface pack";
         {
             let targets = [&base.light, &base.shape];
-            let mut pass = begin(encoder, label, &targets, false);
-            over_tiles(&mut pass, passes.pack.each_ref(), &frame.pack, base);
+            let mut pass = recorder.draw("subsurface::pyramid pack", &targets, false);
+            over_tiles(&mut pass, &passes.pack, &groups.pack, base);
         }
-        after(label, encoder);
-        forget_tiles(encoder, base);
-        let label = "subsurface simple tiles";
+        forget_tiles(recorder, base);
         {
-            let mut pass = begin_compute(encoder, label);
-            for (group, level) in frame.gather.iter().zip(&scratch.levels) {
+            let mut pass = recorder.dispatch("subsurface::pyramid simple tiles");
+            for (group, level) in groups.gather.iter().zip(&scratch.levels) {
                 gather(&mut pass, &passes.gather, group, level);
             }
         }
-        after(label, encoder);
-        for ((group, level), l) in frame.halve.iter().zip(coarser).zip(1..) {
-            let label = format!("subsurface halve to level {l}");
-            {
-                let targets = [&level.light, &level.shape];
-                let mut pass = begin(encoder, &label, &targets, false);
-                over_tiles(&mut pass, passes.halve.each_ref(), group, level);
-            }
-            after(&label, encoder);
+        for ((group, level), l) in groups.halve.iter().zip(coarser).zip(1..) {
+            let label = format!("subsurface::pyramid halve to level {l}");
+            let targets = [&level.light, &level.shape];
+            let mut pass = recorder.draw(&label, &targets, false);
+            over_tiles(&mut pass, &passes.halve, group, level);
         }
         for l in (1..scratch.levels.len()).rev() {
-            let label = format!("subsurface blur level {l}");
-            {
-                let (group, level) = (&frame.level[l - 1], &scratch.levels[l]);
-                let mut pass = begin(encoder, &label, &[scratch.mean(l)], false);
-                let [x, y] = level.size.map(|s| s as f32);
-                pass.set_viewport(0.0, 0.0, x, y, 0.0, 1.0);
-                over_tiles(&mut pass, passes.level.each_ref(), group, level);
-            }
-            after(&label, encoder);
+            let (group, level) = (&groups.level[l - 1], &scratch.levels[l]);
+            let label = format!("subsurface::pyramid blur level {l}");
+            let mut pass = recorder.draw(&label, &[scratch.mean(l)], false);
+            let [x, y] = level.size.map(|s| s as f32);
+            pass.set_viewport(0.0, 0.0, x, y, 0.0, 1.0);
+            over_tiles(&mut pass, &passes.level, group, level);
         }
-        let label = "subsurface blur frame";
-        {
-            let keeps = self.output.adds() || frame.viewport.is_some();
-            let mut pass = begin(encoder, label, &[&frame.views.output], keeps);
-            if let Some(viewport) = frame.viewport {
-                viewport.apply(&mut pass);
-            }
-            if !self.output.is_difference() {
-                pass.set_pipeline(&passes.copy.pipeline);
-                pass.set_bind_group(0, &frame.copy, &[]);
-                pass.draw(0..3, 0..1);
-            }
-            over_tiles(&mut pass, passes.frame.each_ref(), &frame.frame, base);
+        let keeps = self.output.adds() || groups.viewport.is_some();
+        let mut pass = recorder.draw("subsurface::pyramid blur frame", &[output], keeps);
+        if let Some(viewport) = groups.viewport {
+            viewport.apply(&mut pass);
         }
-        after(label, encoder);
+        if !self.output.is_difference() {
+            pass.set_pipeline(&passes.copy);
+            pass.set_bind_group(0, &groups.copy, &[]);
+            pass.draw(0..3, 0..1);
+        }
+        over_tiles(&mut pass, &passes.frame, &groups.frame, base);
     }
 }
 
-fn forget_tiles(encoder: &mut CommandEncoder, level: &LevelScratch) {
+fn forget_tiles(recorder: &mut Recorder, level: &LevelScratch) {
     for i in 0..2 {
-        encoder.clear_buffer(&level.draws, i * DRAW_BYTES + 4, Some(4));
+        let draw = i * DRAW_BYTES + 4;
+        recorder.encoder.clear_buffer(&level.draws, draw, Some(4));
     }
-}
-
-fn begin_compute<'a>(encoder: &'a mut CommandEncoder, label: &str) -> wgpu::ComputePass<'a> {
-    encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-        label: Some(label),
-        timestamp_writes: None,
-    })
 }
 
 fn gather(pass: &mut wgpu::ComputePass, to: &Compute, group: &BindGroup, level: &LevelScratch) {
@@ -257,240 +351,13 @@ fn gather(pass: &mut wgpu::ComputePass, to: &Compute, group: &BindGroup, level: 
 /// Draws the simple tiles of a level by the first, the others by the second.
 fn over_tiles(
     pass: &mut wgpu::RenderPass,
-    draws: [&Draw; 2],
+    draws: &OverTiles,
     group: &BindGroup,
     level: &LevelScratch,
 ) {
     pass.set_bind_group(0, group, &[]);
-    for (i, draw) in (0..).zip(draws) {
-        pass.set_pipeline(&draw.pipeline);
+    for (i, pipeline) in (0..).zip(&draws.pipelines) {
+        pass.set_pipeline(pipeline);
         pass.draw_indirect(&level.draws, i * DRAW_BYTES);
-    }
-}
-
-fn weights(device: &Device, plan: &Weights) -> Buffer {
-    let table = plan.table();
-    let contents = bytemuck::cast_slice(&table);
-    filled(
-        device,
-        "subsurface weights",
-        contents,
-        wgpu::BufferUsages::STORAGE,
-    )
-}
-
-impl Frame {
-    fn new(
-        device: &Device,
-        linear: &Sampler,
-        planned: &Planned,
-        scratch: &Scratch,
-        views: Views,
-        viewport: Option<Viewport>,
-    ) -> Self {
-        let Planned {
-            weights, passes, ..
-        } = planned;
-        let Views {
-            irradiance,
-            depth,
-            profile_id,
-            strength,
-            normal,
-            ..
-        } = &views;
-        use wgpu::BindingResource::{Sampler, TextureView as Texture};
-        let group = |layout: &BindGroupLayout, entries: &[(u32, wgpu::BindingResource)]| {
-            let entries: Vec<_> = entries
-                .iter()
-                .map(|(binding, resource)| wgpu::BindGroupEntry {
-                    binding: *binding,
-                    resource: resource.clone(),
-                })
-                .collect();
-            device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("subsurface"),
-                layout,
-                entries: &entries,
-            })
-        };
-        let levels = &scratch.levels;
-        let base = &levels[0];
-        let view = scratch.view.as_entire_binding();
-        let none = scratch_view(device, "subsurface nothing", [1, 1], LIGHT);
-        let blur = |draw: &Draw, l: usize| {
-            // The last level has none that is coarser; it does not look.
-            let (shape, mean) = match levels.get(l + 1) {
-                Some(next) => (&next.shape, scratch.mean(l + 1)),
-                None => (&levels[l].shape, &none),
-            };
-            let mut entries = vec![
-                (0, view.clone()),
-                (1, levels[l].settings.as_entire_binding()),
-                (2, levels[l].list.as_entire_binding()),
-                (3, weights.as_entire_binding()),
-                (7, Texture(&levels[l].light)),
-                (8, Texture(&levels[l].shape)),
-                (9, Texture(mean)),
-                (10, Texture(shape)),
-                (12, Sampler(linear)),
-            ];
-            if l == 0 {
-                entries.push((4, Texture(strength)));
-            }
-            group(&draw.layout, &entries)
-        };
-        let gather = |l: usize| {
-            let below = match l {
-                0 => &scratch.marked,
-                _ => &levels[l - 1].marked,
-            };
-            let entries = [
-                (5, levels[l].gathering.as_entire_binding()),
-                (6, below.as_entire_binding()),
-                (7, levels[l].marked.as_entire_binding()),
-                (8, levels[l].draws.as_entire_binding()),
-                (9, levels[l].list.as_entire_binding()),
-                (10, Texture(&base.shape)),
-            ];
-            group(&passes.gather.layout, &entries)
-        };
-        let halve = |l: usize| {
-            let entries = [
-                (0, view.clone()),
-                (1, levels[l].settings.as_entire_binding()),
-                (2, levels[l].list.as_entire_binding()),
-                (7, Texture(&levels[l - 1].light)),
-                (8, Texture(&levels[l - 1].shape)),
-                (12, Sampler(linear)),
-            ];
-            group(&passes.halve[0].layout, &entries)
-        };
-        Self {
-            viewport,
-            mark: group(
-                &passes.mark.layout,
-                &[
-                    (0, view.clone()),
-                    (1, Texture(depth)),
-                    (2, Texture(profile_id)),
-                    (3, weights.as_entire_binding()),
-                    (4, scratch.marked.as_entire_binding()),
-                ],
-            ),
-            gather: (0..levels.len()).map(gather).collect(),
-            pack: group(
-                &passes.pack[0].layout,
-                &[
-                    (0, view.clone()),
-                    (1, base.settings.as_entire_binding()),
-                    (2, base.list.as_entire_binding()),
-                    (4, Texture(irradiance)),
-                    (5, Texture(depth)),
-                    (6, Texture(profile_id)),
-                    (11, scratch.marked.as_entire_binding()),
-                    (13, scratch.normals.as_entire_binding()),
-                    (14, Texture(normal)),
-                ],
-            ),
-            halve: (1..levels.len()).map(halve).collect(),
-            level: (1..levels.len())
-                .map(|l| blur(&passes.level[0], l))
-                .collect(),
-            frame: blur(&passes.frame[0], 0),
-            copy: group(&passes.copy.layout, &[(4, Texture(irradiance))]),
-            views: views.clone(),
-        }
-    }
-}
-
-#[cfg(all(test, feature = "renderer"))]
-mod tests {
-    use super::*;
-    use crate::renderer::Gpu;
-    use crate::{Plan, PlannedScreenSpace, Profile, ScreenFrame};
-
-    /// Tiles that are drawn of each level: simple ones, and others.
-    fn drawn(gpu: &Gpu, pyramid: &Pyramid) -> Vec<[u32; 2]> {
-        let levels = &pyramid.scratch.as_ref().unwrap().levels;
-        let counts = levels.iter().map(|level| {
-            let copy = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: None,
-                size: 2 * DRAW_BYTES,
-                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-                mapped_at_creation: false,
-            });
-            gpu.run(|encoder| {
-                encoder.copy_buffer_to_buffer(&level.draws, 0, &copy, 0, 2 * DRAW_BYTES);
-            });
-            copy.map_async(wgpu::MapMode::Read, .., |result| result.unwrap());
-            gpu.device
-                .poll(wgpu::PollType::wait_indefinitely())
-                .unwrap();
-            let bytes = copy.get_mapped_range(..).unwrap();
-            let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
-            [words[1], words[5]]
-        });
-        counts.collect()
-    }
-
-    #[test]
-    fn tiles_are_drawn_where_there_is_skin() {
-        let gpu = Gpu::headless().unwrap();
-        let format = TextureFormat::Rgba16Float;
-        let size = [160, 96];
-        let count = (size[0] * size[1]) as usize;
-        let light = gpu.upload(
-            "irradiance",
-            size,
-            TextureFormat::Rgba32Float,
-            &vec![[0.5f32; 4]; count],
-        );
-        let depth = gpu.upload("depth", size, TextureFormat::R32Float, &vec![0.5f32; count]);
-        let output = gpu.target("output", size, format);
-        let mut effect = PlannedScreenSpace::new(&gpu.device, format).unwrap();
-        let plan = Plan::new(&[Profile::SKIN], 0.01).unwrap();
-        let mut drawn_for = |id: u8, px_per_mm: f32| {
-            let frame = ScreenFrame {
-                irradiance: &light,
-                depth: &depth,
-                profile_id: Some(&gpu.upload("id", size, TextureFormat::R8Uint, &vec![id; count])),
-                normal: None,
-                strength: None,
-                viewport: None,
-                output: &output,
-                // A facing plane.
-                projection: glam::Mat4::from_diagonal(glam::Vec4::new(
-                    2.0 * px_per_mm / size[0] as f32,
-                    2.0 * px_per_mm / size[1] as f32,
-                    -0.001,
-                    1.0,
-                )),
-                mm_per_unit: 1.0,
-                profiles: &[Profile::SKIN],
-            };
-            effect
-                .prepare(&gpu.device, &gpu.queue, &frame, &plan)
-                .unwrap();
-            gpu.run(|encoder| effect.render(encoder));
-            drawn(&gpu, effect.pyramid())
-        };
-        assert!(drawn_for(0, 4.0).iter().all(|tiles| *tiles == [0, 0]));
-        // Those at the border see what is beyond it.
-        assert_eq!(drawn_for(1, 4.0)[0], [18 * 10, 20 * 12 - 18 * 10]);
-        // The plan says up to which level. Below its first row and beyond its last one, too, and nowhere
-        // on a row, where rounding decides.
-        let rows = plan.rows(0);
-        let mut levels = Vec::new();
-        for octave in -7..=9 {
-            let px_per_mm = (octave as f32 + 0.03).exp2();
-            let row = plan.tile_row(px_per_mm).unwrap();
-            let drawn = drawn_for(1, px_per_mm);
-            let drawn = drawn.iter().take_while(|tiles| **tiles != [0, 0]).count();
-            // A frame of 160 pixels has no more than eight.
-            assert_eq!(drawn, 1 + rows[row].level.min(8), "{px_per_mm} px/mm");
-            levels.push(rows[row].level);
-        }
-        assert_eq!([levels[0], levels[16]], [0, 10]);
     }
 }

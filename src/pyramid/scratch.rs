@@ -5,8 +5,7 @@ use glam::{UVec2, Vec2, Vec4};
 use wgpu::{Buffer, BufferUsages, Device, Queue, TextureView};
 
 use super::passes::{LIGHT, SHAPE};
-use crate::frame::NormalSettings;
-use crate::gaussian_sum::scratch_view;
+use crate::gpu;
 use crate::plan::{Shape, Weights, own_blur};
 
 /// Side of a tile, in pixels of its level.
@@ -21,7 +20,7 @@ pub(super) struct View {
     pub has_id: u32,
     pub has_strength: u32,
     pub far: f32,
-    pub pad: u32,
+    pub has_albedo: u32,
     pub origin: Vec4,
     pub step: Vec4,
     pub depth_to_mm: Vec4,
@@ -71,10 +70,10 @@ struct Gathering {
 /// Bytes of a `Draw` of tiles.wgsl; each list has two, of simple tiles and of the others.
 pub(super) const DRAW_BYTES: u64 = 16;
 
+#[derive(Debug)]
 pub(super) struct Scratch {
     pub size: [u32; 2],
     pub view: Buffer,
-    pub normals: Buffer,
     /// What the frame's tiles hold, and where they bend.
     pub marked: Buffer,
     pub levels: Vec<LevelScratch>,
@@ -82,6 +81,7 @@ pub(super) struct Scratch {
     pub means: [TextureView; 2],
 }
 
+#[derive(Debug)]
 pub(super) struct LevelScratch {
     pub size: [u32; 2],
     pub tiles: [u32; 2],
@@ -94,16 +94,39 @@ pub(super) struct LevelScratch {
     pub draws: Buffer,
 }
 
+/// Levels above a frame of this size: one of a single pixel has nothing above it.
+fn level_count(size: [u32; 2], plan: &Weights) -> usize {
+    let largest = size[0].max(size[1]);
+    plan.levels
+        .min(largest.next_power_of_two().ilog2() as usize)
+}
+
+fn size_of_level(size: [u32; 2], l: usize) -> [u32; 2] {
+    size.map(|s| s.div_ceil(1 << l))
+}
+
+fn count([x, y]: [u32; 2]) -> u64 {
+    u64::from(x) * u64::from(y)
+}
+
+/// Bytes of the textures and lists of a frame of this size.
+pub(super) fn bytes(size: [u32; 2], plan: &Weights) -> u64 {
+    let tiles = |size: [u32; 2]| count(size.map(|s| s.div_ceil(TILE)));
+    let of_level = |l| {
+        let size = size_of_level(size, l);
+        // Light and shape, marks and a list.
+        16 * count(size) + 8 * tiles(size)
+    };
+    let levels: u64 = (0..=level_count(size, plan)).map(of_level).sum();
+    let means: u64 = [1, 2]
+        .map(|l| 8 * count(size_of_level(size, l)))
+        .iter()
+        .sum();
+    levels + means + 4 * tiles(size)
+}
+
 impl Scratch {
     pub fn new(device: &Device, queue: &Queue, size: [u32; 2], plan: &Weights) -> Self {
-        let uniform = |label: &str, size: usize| {
-            device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(label),
-                size: size as u64,
-                usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        };
         let words = |label: &str, count: u32, usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -112,12 +135,8 @@ impl Scratch {
                 mapped_at_creation: false,
             })
         };
-        // A level of one pixel has nothing above it.
-        let largest = size[0].max(size[1]);
-        let levels = plan
-            .levels
-            .min(largest.next_power_of_two().ilog2() as usize);
-        let size_of_level = |l: usize| size.map(|s| s.div_ceil(1 << l));
+        let levels = level_count(size, plan);
+        let size_of_level = |l| size_of_level(size, l);
         let tiles_of_frame = size.map(|s| s.div_ceil(TILE));
         let frame_tiles = tiles_of_frame[0] * tiles_of_frame[1];
         let mut below = tiles_of_frame;
@@ -129,14 +148,17 @@ impl Scratch {
                 let level = LevelScratch {
                     size,
                     tiles,
-                    gathering: uniform("subsurface tiles of a level", size_of::<Gathering>()),
-                    settings: uniform("subsurface level", size_of::<Level>()),
-                    light: scratch_view(device, "subsurface light", size, LIGHT),
-                    shape: scratch_view(device, "subsurface shape", size, SHAPE),
-                    marked: words("subsurface marks", count, BufferUsages::empty()),
-                    list: words("subsurface tiles", count, BufferUsages::empty()),
+                    gathering: gpu::uniform_buffer::<Gathering>(
+                        device,
+                        "subsurface::pyramid tiles of a level",
+                    ),
+                    settings: gpu::uniform_buffer::<Level>(device, "subsurface::pyramid level"),
+                    light: gpu::scratch_texture(device, "subsurface::pyramid light", size, LIGHT),
+                    shape: gpu::scratch_texture(device, "subsurface::pyramid shape", size, SHAPE),
+                    marked: words("subsurface::pyramid marks", count, BufferUsages::empty()),
+                    list: words("subsurface::pyramid tiles", count, BufferUsages::empty()),
                     draws: words(
-                        "subsurface draws",
+                        "subsurface::pyramid draws",
                         8,
                         BufferUsages::INDIRECT | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
                     ),
@@ -150,20 +172,31 @@ impl Scratch {
                     pad: 0,
                 };
                 queue.write_buffer(&level.gathering, 0, bytemuck::bytes_of(&gathering));
-                let settings = level_settings(plan, l, levels, size);
-                queue.write_buffer(&level.settings, 0, bytemuck::bytes_of(&settings));
                 below = tiles;
                 level
             })
             .collect();
-        let mean = |l| scratch_view(device, "subsurface mean", size_of_level(l), LIGHT);
+        let mean =
+            |l| gpu::scratch_texture(device, "subsurface::pyramid mean", size_of_level(l), LIGHT);
         Self {
             size,
-            view: uniform("subsurface view", size_of::<View>()),
-            normals: uniform("subsurface normals", size_of::<NormalSettings>()),
-            marked: words("subsurface marks", frame_tiles, BufferUsages::COPY_DST),
+            view: gpu::uniform_buffer::<View>(device, "subsurface::pyramid view"),
+            marked: words(
+                "subsurface::pyramid marks",
+                frame_tiles,
+                BufferUsages::COPY_DST,
+            ),
             levels,
             means: [mean(1), mean(2)],
+        }
+    }
+
+    /// Uploads what the blurs of each level are by this plan.
+    pub fn set_plan(&self, queue: &Queue, plan: &Weights) {
+        let last = self.levels.len() - 1;
+        for (l, level) in self.levels.iter().enumerate() {
+            let settings = level_settings(plan, l, last, level.size);
+            queue.write_buffer(&level.settings, 0, bytemuck::bytes_of(&settings));
         }
     }
 
@@ -211,29 +244,32 @@ mod tests {
     #[test]
     fn constants_are_those_of_the_shaders() {
         let rows = crate::plan::ROWS_PER_OCTAVE;
-        for shader in [BLURS[0], TILES] {
+        let [blurs, tiles, pack] = [BLURS[0], TILES, PACK].map(<[&str]>::concat);
+        for shader in [&blurs, &tiles] {
             assert!(shader.contains(&format!("const TILE = {TILE}u;")));
             assert!(shader.contains(&format!("const ROWS_PER_OCTAVE = {rows:.1};")));
         }
         // A bit for the frame and for each level, then for the bends; from the other end for each profile.
         let bends = format!("const BENT_SHIFT = {}u;", crate::plan::MAX_LEVELS + 1);
         for shared in ["const FLAT_LEVELS = 3u;", &bends] {
-            assert!(TILES.contains(shared) && PACK.contains(shared));
+            assert!(tiles.contains(shared) && pack.contains(shared));
         }
         let profiles = 32 - crate::MAX_PROFILES;
-        assert!(TILES.contains(&format!("const PROFILE_SHIFT = {profiles}u;")));
-        assert!(TILES.contains(&format!("const COLUMNS = {COLUMNS}u;")));
+        assert!(tiles.contains(&format!("const PROFILE_SHIFT = {profiles}u;")));
+        assert!(tiles.contains(&format!("const COLUMNS = {COLUMNS}u;")));
     }
 
     #[test]
     fn structs_lie_as_the_shaders_have_them() {
+        let [blurs, tiles] = [BLURS[0], TILES].map(<[&str]>::concat);
         assert_layout!(
-            BLURS[0],
+            &blurs,
             "View",
             View {
                 has_id,
                 has_strength,
                 far,
+                has_albedo,
                 origin,
                 step,
                 depth_to_mm,
@@ -246,7 +282,7 @@ mod tests {
             }
         );
         assert_layout!(
-            BLURS[0],
+            &blurs,
             "Blur",
             Blur {
                 variance,
@@ -258,7 +294,7 @@ mod tests {
             }
         );
         assert_layout!(
-            BLURS[0],
+            &blurs,
             "Level",
             Level {
                 blurs,
@@ -269,11 +305,11 @@ mod tests {
             }
         );
         assert_eq!(
-            crate::wgsl::layout(TILES, "View"),
-            crate::wgsl::layout(BLURS[0], "View")
+            crate::wgsl::layout(&tiles, "View"),
+            crate::wgsl::layout(&blurs, "View")
         );
         assert_layout!(
-            TILES,
+            &tiles,
             "Level",
             Gathering {
                 tiles,

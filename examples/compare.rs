@@ -1,0 +1,12 @@
+//! Renders a head three ways — no scattering, texture space, screen space — measures how far
+//! they are apart, and writes pictures, layers and a report.
+//!
+//! ```sh
+//! cargo run --release --example compare
+//! ```
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    subsurface_lab::compare::main()
+}

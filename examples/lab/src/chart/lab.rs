@@ -1,0 +1,467 @@
+//! Runs the methods on one scene after the other.
+
+use std::time::{Duration, Instant};
+
+use crate::Error;
+use glam::Vec3;
+use image::RgbImage;
+use indicatif::{ProgressBar, ProgressStyle};
+use subsurface::wgpu::{TextureFormat, TextureView};
+use subsurface::{Profile, TextureSpace};
+
+use crate::chart::clock;
+use crate::chart::costs;
+use crate::chart::heads::{self, HEADS, Textured, time_atlas};
+use crate::chart::options::{Options, Plan};
+use crate::chart::progress::{Done, Interval, Visibility};
+use crate::chart::report::SceneImages;
+use crate::chart::row::Row;
+use crate::chart::scene::{Head, Scene, Surface, rgb};
+use crate::chart::score::{Knows, Score};
+use crate::chart::truths::Truths;
+use crate::method::{self, AtlasMethod, Ours, ScreenMethod};
+use crate::renderer::{AtlasRenderer, Gpu, Scene as Model};
+use crate::rivals;
+
+/// What results are written as.
+const OUTPUT: TextureFormat = TextureFormat::Rgba16Float;
+
+/// All methods by name.
+pub const METHODS: [&str; 11] = [
+    "copy",
+    "none",
+    "screen_exact",
+    "screen_planned",
+    "jimenez_2009",
+    "jimenez_separable",
+    "fitted_separable",
+    "burley_disk",
+    "texture_separable",
+    "texture_cascade",
+    "texture_2d",
+];
+
+/// Methods that are compared by the ratio of their times, and so are timed more often.
+const COMPARED: [(&str, &str); 6] = [
+    ("copy", ""),
+    ("screen_exact", ""),
+    ("screen_planned", "1/100"),
+    ("screen_planned", "1/255"),
+    ("jimenez_separable", "17"),
+    ("fitted_separable", "17"),
+];
+
+/// Errors that are asked for: one in so many.
+const PLANNED: [u16; 2] = [100, 255];
+
+/// Side of the pictures in the report, at most.
+const THUMBNAIL: u32 = 256;
+
+/// What stays the same from scene to scene.
+pub struct Lab<'a> {
+    pub gpu: Gpu,
+    pub plan: Plan,
+    pub bar: ProgressBar,
+    /// Of the skin profile, by the error that they keep.
+    plans: Vec<(String, subsurface::Plan)>,
+    model: Model,
+    options: &'a Options,
+}
+
+impl<'a> Lab<'a> {
+    /// # Errors
+    /// No adapter; a size that it cannot render.
+    pub fn new(model: Model, options: &'a Options) -> Result<Self, Error> {
+        let gpu = Gpu::headless()?;
+        let plan = Plan::new(options);
+        gpu.check_size(plan.size)?;
+        let style = ProgressStyle::with_template("{bar:24} {msg}");
+        let bar = ProgressBar::no_length().with_style(style.expect("the template is a constant"));
+        let mut plans = Vec::new();
+        for steps in PLANNED {
+            let plan = subsurface::Plan::new(&[Profile::SKIN], 1.0 / f32::from(steps))?;
+            plans.push((format!("1/{steps}"), plan));
+        }
+        Ok(Self {
+            gpu,
+            plan,
+            bar,
+            plans,
+            model,
+            options,
+        })
+    }
+
+    fn wanted(&self, method: &str) -> bool {
+        // The floor is what all is a multiple of.
+        let methods = self.options.methods.as_ref();
+        method == "copy" || methods.is_none_or(|m| m.iter().any(|name| name == method))
+    }
+
+    fn begin(&self, what: String, steps: usize) {
+        self.bar.set_length(steps as u64);
+        self.bar.set_position(0);
+        self.bar.set_message(what);
+        self.bar.enable_steady_tick(Duration::from_millis(200));
+    }
+
+    /// A scene, from drawing it to the rows of all methods.
+    ///
+    /// # Errors
+    /// A scene that cannot be drawn; a cache that cannot be written.
+    pub fn scene(&self, name: &str) -> Result<Done, Error> {
+        let Self { gpu, model, .. } = self;
+        let Plan { size, stride, .. } = self.plan;
+        self.begin(format!("{name}: drawing"), 1);
+        let scene = Scene::new(gpu, model, self.options.mm_per_unit, name, size, stride)?;
+        let cache = &self.options.cache;
+        let truths = Truths::of(gpu, model, &scene, &Profile::SKIN, cache, &self.bar)?;
+        let score = Score::new(&scene, &truths, read(gpu, &scene, &scene.irradiance));
+        let mut done = Done::default();
+        let [rel_rmse_eq7, rel_rmse_eq7_normalised] = score.visibility_error();
+        done.visibility.push(Visibility {
+            scene: name.into(),
+            rel_rmse_eq7,
+            rel_rmse_eq7_normalised,
+        });
+        let copy_ms = self.screen(&scene, &score, &mut done)?;
+        if let Surface::Head(head) = &scene.surface {
+            self.textures(&scene, head, &score, copy_ms, &mut done)?;
+        }
+        Ok(done)
+    }
+
+    /// Those in screen space that are wanted, the copy first.
+    fn screen_methods(&self) -> Result<Vec<rivals::Screen>, Error> {
+        let device = &self.gpu.device;
+        let mut methods = rivals::screen(device, OUTPUT, &Profile::SKIN)?;
+        let exact = subsurface::Plan::exact(&[Profile::SKIN])?;
+        let exact = Ours::new(device, OUTPUT, &exact)?;
+        methods.insert(1, ("screen_exact", String::new(), Box::new(exact)));
+        for (i, (setting, plan)) in self.plans.iter().enumerate() {
+            let planned = Ours::new(device, OUTPUT, plan)?;
+            methods.insert(
+                2 + i,
+                ("screen_planned", setting.clone(), Box::new(planned)),
+            );
+        }
+        methods.retain(|(name, ..)| self.wanted(name));
+        Ok(methods)
+    }
+
+    /// Every method in screen space; the median time of the copy.
+    fn screen(&self, scene: &Scene, score: &Score, done: &mut Done) -> Result<f64, Error> {
+        let gpu = &self.gpu;
+        let mut images = images_of(&scene.name, score, Knows::Frame);
+        let mut methods = self.screen_methods()?;
+        self.begin(format!("{}: warming up", scene.name), methods.len());
+        let output = gpu.target("scattered", scene.size, OUTPUT);
+        let frame = scene.frame();
+        let mut results = Vec::new();
+        for (_, _, method) in &mut methods {
+            method::scatter(gpu, &mut **method, &frame, &output)?;
+            results.push(read(gpu, scene, &output));
+            self.bar.inc(1);
+        }
+        let timed: Vec<(&dyn ScreenMethod, &TextureView, bool)> = methods
+            .iter()
+            .map(|(name, setting, method)| {
+                let compared = COMPARED.contains(&(*name, setting.as_str()));
+                (method.as_ref(), &output, compared)
+            })
+            .collect();
+        let rounds = self.plan.rounds;
+        self.begin(format!("{}: timing", scene.name), rounds.compared);
+        let times = clock::rounds(gpu, &timed, rounds, || self.bar.inc(1))?;
+
+        if self.wanted("none") {
+            let mut row = empty_row(scene, "none", "");
+            score.fill(&mut row, &results[0], Knows::Frame);
+            show(
+                &mut images,
+                score,
+                "no scattering",
+                &results[0],
+                Knows::Frame,
+            );
+            done.rows.push(row);
+        }
+        for (i, (name, setting, method)) in methods.iter().enumerate() {
+            let (x_copy, interval_95) = clock::ratio(&times[i], &times[0]);
+            let mut row = Row {
+                ms: clock::median(&times[i]),
+                x_copy,
+                fetches: method.fetches(scene.px_per_mm),
+                scratch_bytes_per_pixel: Some(method.scratch_bytes_per_pixel()),
+                ..empty_row(scene, name, setting)
+            };
+            score.fill(&mut row, &results[i], Knows::Frame);
+            if *name != "copy" {
+                show(
+                    &mut images,
+                    score,
+                    &format!("{name} {setting}"),
+                    &results[i],
+                    Knows::Frame,
+                );
+            }
+            done.rows.push(row);
+            done.intervals
+                .push(interval(scene, name, setting, times[i].len(), interval_95));
+        }
+        done.keep_images(&images)?;
+        Ok(clock::median(&times[0]))
+    }
+
+    /// Every method in texture space.
+    fn textures(
+        &self,
+        scene: &Scene,
+        head: &Head,
+        score: &Score,
+        copy_ms: f64,
+        done: &mut Done,
+    ) -> Result<(), Error> {
+        let name = format!("{}, texture space", scene.name);
+        let mut images = images_of(&name, score, Knows::Mesh);
+        let mut methods: Vec<(&str, u32, Box<dyn AtlasMethod>)> = Vec::new();
+        for size in self.plan.atlases {
+            let ours = TextureSpace::new(&self.gpu.device, OUTPUT, &[Profile::SKIN])?;
+            methods.push(("texture_separable", *size, Box::new(ours)));
+            for (name, _, method) in rivals::atlas(&self.gpu.device, OUTPUT, &Profile::SKIN) {
+                // One timed run at one head is enough for the full convolution: it takes long.
+                if name != "texture_2d" || scene.name == "front" && *size == self.plan.atlas_2d {
+                    methods.push((name, *size, method));
+                }
+            }
+        }
+        methods.retain(|(name, ..)| self.wanted(name));
+        self.begin(name, methods.len());
+        let output = self.gpu.target("scattered", scene.size, OUTPUT);
+        for (name, size, mut method) in methods {
+            let atlas = AtlasRenderer::new(&self.gpu, &head.renderer, size)?;
+            let mut run = || {
+                let (gpu, mm) = (&self.gpu, scene.mm_per_unit);
+                time_atlas(gpu, &atlas, &head.renderer, method.as_mut(), mm, &output)
+            };
+            // One run warms up, and tells whether the model has UVs at all.
+            if let Err(error) = run() {
+                done.notes
+                    .push(format!("{}: no texture space: {error}.", scene.name));
+                return Ok(());
+            }
+            let runs = if name == "texture_2d" {
+                1
+            } else {
+                self.plan.atlas_runs
+            };
+            let since = Instant::now();
+            let mut times = Vec::new();
+            while times.is_empty()
+                || times.len() < runs && since.elapsed().as_secs_f64() < self.plan.atlas_seconds
+            {
+                times.push(run()?);
+            }
+            let result = read(&self.gpu, scene, &output);
+            let ms = clock::median(&times);
+            let pixels = f64::from(scene.size[0]) * f64::from(scene.size[1]);
+            let texels = f64::from(size) * f64::from(size);
+            let setting = size.to_string();
+            let mut row = Row {
+                ms,
+                x_copy: ms / copy_ms,
+                scratch_bytes_per_pixel: Some(method.scratch_bytes_per_texel() * texels / pixels),
+                ..empty_row(scene, name, &setting)
+            };
+            score.fill(&mut row, &result, Knows::Mesh);
+            let label = format!("{name} {setting}");
+            show(&mut images, score, &label, &result, Knows::Mesh);
+            done.rows.push(row);
+            let runs = times.len();
+            done.notes.push(format!(
+                "{}: {label} is the median of {runs} runs.",
+                scene.name
+            ));
+            self.bar.inc(1);
+        }
+        done.keep_images(&images)
+    }
+
+    /// What a pixel of skin costs, by the methods that are compared by their times.
+    ///
+    /// # Errors
+    /// A model without skin in view; a size that cannot be rendered, or scattered by a method.
+    pub fn costs(&self) -> Result<Done, Error> {
+        let Self { gpu, model, .. } = self;
+        let Plan { size, rounds, .. } = self.plan;
+        self.begin("costs: warming up".into(), costs::SCENES.len());
+        let scenes = costs::scenes(gpu, model, self.options.mm_per_unit, size)?;
+        let (mut methods, mut outputs) = (Vec::new(), Vec::new());
+        for scene in &scenes {
+            let output = gpu.target("scattered", size, OUTPUT);
+            // A method keeps one frame.
+            let mut of_scene = self.screen_methods()?;
+            // The exact effect, whose cost grows with the kernel, would take most of the time.
+            of_scene.retain(|(name, setting, _)| {
+                *name != "screen_exact" && COMPARED.contains(&(*name, setting.as_str()))
+            });
+            for (.., method) in &mut of_scene {
+                method::scatter(gpu, &mut **method, &scene.frame(), &output)?;
+            }
+            outputs.push(output);
+            methods.push(of_scene);
+            self.bar.inc(1);
+        }
+        let mut timed: Vec<(&dyn ScreenMethod, &TextureView, bool)> = Vec::new();
+        for (of_scene, output) in methods.iter().zip(&outputs) {
+            timed.extend(of_scene.iter().map(|(.., m)| (m.as_ref(), output, true)));
+        }
+        self.begin("costs: timing".into(), rounds.compared);
+        let times = clock::rounds(gpu, &timed, rounds, || self.bar.inc(1))?;
+        let count = methods[0].len();
+        let mut done = Done::default();
+        for (s, scene) in scenes.iter().enumerate() {
+            let copy = &times[s * count];
+            for (m, (name, setting, method)) in methods[s].iter().enumerate() {
+                let times = &times[s * count + m];
+                let (x_copy, interval_95) = clock::ratio(times, copy);
+                done.rows.push(Row {
+                    ms: clock::median(times),
+                    x_copy,
+                    fetches: method.fetches(scene.px_per_mm),
+                    scratch_bytes_per_pixel: Some(method.scratch_bytes_per_pixel()),
+                    ..empty_row(scene, name, setting)
+                });
+                done.intervals
+                    .push(interval(scene, name, setting, times.len(), interval_95));
+            }
+        }
+        for (m, (name, setting, _)) in methods[0].iter().enumerate().skip(1) {
+            let of_method = std::array::from_fn(|s| times[s * count + m].as_slice());
+            let name = format!("{name} {setting}");
+            done.notes
+                .push(costs::note(&name, of_method, &times[0], &scenes));
+        }
+        Ok(done)
+    }
+
+    /// Li & Shao's Fig. 8.
+    ///
+    /// # Errors
+    /// A model without skin in view, or without UVs.
+    pub fn heads(&self) -> Result<Done, Error> {
+        self.begin("heads".into(), HEADS.len());
+        let device = &self.gpu.device;
+        let exact = subsurface::Plan::exact(&[Profile::SKIN])?;
+        let mut screen = Ours::new(device, OUTPUT, &exact)?;
+        let mut methods: Vec<(&str, u32, usize, Box<dyn AtlasMethod>)> = Vec::new();
+        for (size, measured) in self.plan.atlases.iter().zip(self.plan.heads) {
+            let ours = TextureSpace::new(device, OUTPUT, &[Profile::SKIN])?;
+            methods.push(("texture_separable", *size, *measured, Box::new(ours)));
+        }
+        for (name, _, method) in rivals::atlas(device, OUTPUT, &Profile::SKIN) {
+            if name == "texture_2d" {
+                methods.push((name, self.plan.atlas_2d, 1, method));
+            }
+        }
+        methods.retain(|(name, ..)| self.wanted(name));
+        let mut textured: Vec<Textured> = methods
+            .iter_mut()
+            .map(|(name, size, measured, method)| Textured {
+                name: format!("{name} {size}"),
+                method: method.as_mut(),
+                size: *size,
+                measured: *measured,
+            })
+            .collect();
+        let screen: &mut dyn ScreenMethod = &mut screen;
+        let (heads, notes) = heads::figure(
+            &self.gpu,
+            &self.model,
+            self.options.mm_per_unit,
+            &self.plan,
+            self.wanted("screen_exact").then_some(screen),
+            &mut textured,
+            |what| {
+                self.bar.inc(1);
+                self.bar.set_message(what.to_owned());
+            },
+        )?;
+        Ok(Done {
+            heads,
+            notes,
+            ..Default::default()
+        })
+    }
+}
+
+/// A result, at the pixels that the truth is asked for.
+fn read(gpu: &Gpu, scene: &Scene, texture: &TextureView) -> Vec<Vec3> {
+    let pixels: Vec<Vec3> = gpu.read(texture).into_iter().map(rgb).collect();
+    scene.asked(&pixels)
+}
+
+fn images_of(scene: &str, score: &Score, knows: Knows) -> SceneImages {
+    SceneImages {
+        scene: scene.into(),
+        truth: thumbnail(score.picture(score.truth(knows))),
+        entries: Vec::new(),
+    }
+}
+
+fn interval(
+    scene: &Scene,
+    method: &str,
+    setting: &str,
+    runs: usize,
+    interval_95: [f64; 2],
+) -> Interval {
+    Interval {
+        scene: scene.name.clone(),
+        method: method.into(),
+        setting: setting.into(),
+        runs,
+        interval_95,
+    }
+}
+
+fn empty_row(scene: &Scene, method: &str, setting: &str) -> Row {
+    Row {
+        scene: scene.name.clone(),
+        method: method.into(),
+        setting: setting.into(),
+        width: scene.size[0],
+        height: scene.size[1],
+        skin_pixels: scene.pixels.len(),
+        px_per_mm: scene.px_per_mm,
+        ms: 0.0,
+        x_copy: 0.0,
+        fetches: None,
+        rel_rmse_visible: None,
+        max_error_visible: None,
+        rel_rmse_eq7: None,
+        max_error_eq7: None,
+        rel_rmse_eq7_normalised: None,
+        delta_e2000_p99: None,
+        flip_mean: None,
+        energy_ratio: None,
+        scratch_bytes_per_pixel: None,
+    }
+}
+
+fn show(images: &mut SceneImages, score: &Score, label: &str, result: &[Vec3], knows: Knows) {
+    images.entries.push((
+        label.trim().to_owned(),
+        thumbnail(score.picture(result)),
+        thumbnail(score.error_map(result, knows)),
+    ));
+}
+
+fn thumbnail(picture: RgbImage) -> RgbImage {
+    let largest = picture.width().max(picture.height());
+    if largest <= THUMBNAIL {
+        return picture;
+    }
+    let side = |s: u32| (s * THUMBNAIL / largest).max(1);
+    image::imageops::thumbnail(&picture, side(picture.width()), side(picture.height()))
+}

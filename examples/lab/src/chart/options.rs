@@ -1,0 +1,157 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use crate::Error;
+
+use crate::chart::clock::Rounds;
+
+const HELP: &str = "\
+Times every method on every scene, measures how far it is from the exact integrals, and draws one
+against the other.
+
+Usage: cargo run --release --example chart -- [OPTIONS]
+
+  --scenes LIST     of front, three-quarter, close-up, far, profile, sphere, edge_0.5 to edge_64,
+                    costs and heads, separated by commas                [all]
+  --methods LIST    such as screen_exact,burley_disk                    [all]
+  --size WxH        of the frames, in pixels                            [512x512; quick: 256x256]
+  --quick           fewer runs, smaller atlases, truths at every fourth pixel, not every second
+  --model FILE      a .glb or .gltf file                                [the built-in head]
+  --mm-per-unit X   length of the model's unit in mm                    [1000: metres]
+  --cache DIR       where truths and finished scenes are kept           [out/chart-cache]
+  --out DIR         where the chart goes                                [out/chart]
+
+A run that was stopped goes on with the scene that it was at.
+";
+
+/// What is asked for.
+pub struct Options {
+    pub scenes: Option<Vec<String>>,
+    pub methods: Option<Vec<String>>,
+    pub size: Option<[u32; 2]>,
+    pub quick: bool,
+    pub model: Option<PathBuf>,
+    pub mm_per_unit: f32,
+    pub cache: PathBuf,
+    pub out: PathBuf,
+}
+
+impl Options {
+    /// The command line; `None` when it asked for help.
+    pub fn parse() -> Result<Option<Self>, Error> {
+        use lexopt::prelude::*;
+
+        let mut options = Self {
+            scenes: None,
+            methods: None,
+            size: None,
+            quick: false,
+            model: None,
+            mm_per_unit: 1000.0,
+            cache: "out/chart-cache".into(),
+            out: "out/chart".into(),
+        };
+        let refused = |e: lexopt::Error| {
+            let got = format!("\"{e}\"");
+            Error::new("command line", got, "options as --help lists them")
+        };
+        let mut parser = lexopt::Parser::from_env();
+        while let Some(arg) = parser.next().map_err(refused)? {
+            let name = match arg {
+                Long(name) => name.to_string(),
+                Short('h') => "help".into(),
+                other => return Err(refused(other.unexpected())),
+            };
+            let mut text = || parser.value().and_then(|v| v.string()).map_err(refused);
+            let list = |text: String| Some(text.split(',').map(String::from).collect());
+            match name.as_str() {
+                "help" => {
+                    print!("{HELP}");
+                    return Ok(None);
+                }
+                "quick" => options.quick = true,
+                "scenes" => options.scenes = list(text()?),
+                "methods" => options.methods = list(text()?),
+                "model" => options.model = Some(text()?.into()),
+                "cache" => options.cache = text()?.into(),
+                "out" => options.out = text()?.into(),
+                "size" => options.size = Some(size(&text()?)?),
+                "mm-per-unit" => {
+                    let text = text()?;
+                    options.mm_per_unit = text
+                        .parse()
+                        .ok()
+                        .filter(|x: &f32| x.is_finite() && *x > 0.0)
+                        .ok_or_else(|| Error::new("--mm-per-unit", text, "a number above 0"))?;
+                }
+                _ => return Err(refused(Long(name.as_str()).unexpected())),
+            }
+        }
+        Ok(Some(options))
+    }
+}
+
+fn size(text: &str) -> Result<[u32; 2], Error> {
+    text.split_once('x')
+        .and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]))
+        // A pixel less would leave nothing once rims are taken off.
+        .filter(|size: &[u32; 2]| size.iter().all(|s| *s >= 16))
+        .ok_or_else(|| {
+            let needs = "WIDTHxHEIGHT in pixels, such as 512x512, at least 16x16";
+            Error::new("--size", text, needs)
+        })
+}
+
+/// What `--quick` cuts, and nothing else does.
+pub struct Plan {
+    pub size: [u32; 2],
+    pub rounds: Rounds,
+    /// The truth is asked for at every so many pixels, each way.
+    pub stride: u32,
+    /// Sides of the atlases, in texels.
+    pub atlases: &'static [u32],
+    /// Numbers of heads at which each is timed for Fig. 8; the others are extrapolated.
+    pub heads: &'static [usize],
+    /// A full convolution takes a minute at 512².
+    pub atlas_2d: u32,
+    /// Runs of an atlas, or as many as fit into this time.
+    pub atlas_runs: usize,
+    pub atlas_seconds: f64,
+}
+
+impl Plan {
+    pub fn new(options: &Options) -> Self {
+        let size = |default| options.size.unwrap_or([default; 2]);
+        if options.quick {
+            return Self {
+                size: size(256),
+                rounds: Rounds {
+                    all: 3,
+                    compared: 3,
+                    seconds: 2.0,
+                },
+                stride: 4,
+                atlases: &[256, 512],
+                heads: &[5, 3],
+                atlas_2d: 256,
+                atlas_runs: 1,
+                atlas_seconds: 0.0,
+            };
+        }
+        Self {
+            size: size(512),
+            rounds: Rounds {
+                all: 9,
+                compared: 31,
+                seconds: 30.0,
+            },
+            stride: 2,
+            atlases: &[512, 1024],
+            heads: &[5, 5],
+            atlas_2d: 512,
+            atlas_runs: 9,
+            atlas_seconds: 10.0,
+        }
+    }
+}

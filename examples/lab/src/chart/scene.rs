@@ -1,0 +1,332 @@
+//! What the methods are tried on: a frame as a host hands it over, and what its pixels show.
+
+use crate::Error;
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec3};
+use half::f16;
+use subsurface::wgpu::{TextureFormat, TextureView};
+use subsurface::{Frame, Profile};
+
+use crate::renderer::{Camera, Gpu, Lighting, Primitive, Probe, Renderer, Scene as Model, View};
+use crate::truth::{Patch, Pixel, closed_form};
+
+/// σ of red light in the skin profile, in mm, by which the edges are named.
+const RED_SIGMA_MM: f64 = 1.176;
+/// Projected widths of the edges: red σ in pixels.
+const EDGES_PX: [f64; 8] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
+/// From this width on, the truth of an edge is asked for at so many times fewer pixels each way: it
+/// would take hours.
+const SPARSE_FROM_PX: f64 = 8.0;
+pub const SPARSE: u32 = 2;
+
+/// Names of the scenes, in the order in which they are run.
+pub fn names() -> Vec<String> {
+    let heads = [
+        "front",
+        "three-quarter",
+        "close-up",
+        "far",
+        "profile",
+        "sphere",
+    ];
+    let edges = EDGES_PX.iter().map(|px| format!("edge_{px}"));
+    heads.map(String::from).into_iter().chain(edges).collect()
+}
+
+/// A frame, and what is known of it beyond what methods are told.
+pub struct Scene {
+    pub name: String,
+    pub size: [u32; 2],
+    pub px_per_mm: f64,
+    pub irradiance: TextureView,
+    pub depth: TextureView,
+    pub profile_id: TextureView,
+    pub projection: Mat4,
+    pub mm_per_unit: f32,
+    /// Whether a pixel scatters.
+    pub skin: Vec<bool>,
+    /// What the pixels of `skin` show, in their order.
+    pub pixels: Vec<Pixel>,
+    /// Of every pixel; white where a scene has none.
+    pub albedo: Vec<Vec3>,
+    /// The truth is asked for at every so many pixels, each way.
+    pub stride: u32,
+    pub surface: Surface,
+}
+
+/// What the surface integral is taken over.
+pub enum Surface {
+    Head(Box<Head>),
+    /// Known on paper, in the order of `pixels`.
+    Known(Vec<Vec3>),
+}
+
+/// A head, as it was last rendered.
+pub struct Head {
+    pub renderer: Renderer,
+    pub camera: Camera,
+}
+
+impl Scene {
+    /// The scene of this name; the truth is asked for at every `stride` pixels, or fewer.
+    ///
+    /// # Errors
+    /// A name that is none, or a size that the device cannot render.
+    pub fn new(
+        gpu: &Gpu,
+        model: &Model,
+        mm_per_unit: f32,
+        name: &str,
+        size: [u32; 2],
+        stride: u32,
+    ) -> Result<Self, Error> {
+        let view = |view| Camera::framing(model, view, size);
+        let camera = match name {
+            "front" => view(View::Front),
+            "three-quarter" => view(View::ThreeQuarter),
+            "close-up" => view(View::CloseUp),
+            "profile" => view(View::Profile),
+            "far" => far(view(View::Front), size, mm_per_unit),
+            "sphere" => return Ok(sphere(gpu, size, stride)),
+            _ => {
+                let width = name.strip_prefix("edge_").and_then(|px| px.parse().ok());
+                return match width {
+                    Some(sigma_px) if EDGES_PX.contains(&sigma_px) => {
+                        Ok(edge(gpu, size, sigma_px, stride))
+                    }
+                    _ => Err(Error::new("--scenes", name, names().join(", "))),
+                };
+            }
+        };
+        let scene = Self::head(gpu, model, mm_per_unit, name, size, camera)?;
+        Ok(Self { stride, ..scene })
+    }
+
+    /// Any view of heads.
+    ///
+    /// # Errors
+    /// A size that the device cannot render; no skin in view.
+    pub fn head(
+        gpu: &Gpu,
+        model: &Model,
+        mm_per_unit: f32,
+        name: &str,
+        size: [u32; 2],
+        camera: Camera,
+    ) -> Result<Self, Error> {
+        let renderer = Renderer::new(gpu, model, size)?;
+        renderer.render(gpu, &camera, &Lighting::default(), mm_per_unit)?;
+        let visible = Probe::new(gpu, &renderer).visible(gpu, &renderer);
+        let g = &renderer.gbuffer;
+        let skin: Vec<bool> = gpu
+            .read_bytes(g.profile_id.texture())
+            .iter()
+            .map(|id| *id == 1)
+            .collect();
+        let irradiance = gpu.read(&g.irradiance);
+        let view = camera.view();
+        let mm_per_px = 2.0 * (camera.fov_y / 2.0).tan() / size[1] as f32;
+        if !skin.contains(&true) {
+            return Err(Error::new(name, "no skin in view", "a model that scatters"));
+        }
+        let pixels = (0..skin.len()).filter(|i| skin[*i]).map(|i| {
+            let [x, y, z, area_mm2] = visible[i];
+            let point_mm = Vec3::new(x, y, z);
+            let depth_mm = -view.transform_point3(point_mm / mm_per_unit).z * mm_per_unit;
+            Pixel {
+                patch: Patch {
+                    point_mm,
+                    area_mm2,
+                    irradiance: rgb(irradiance[i]),
+                },
+                facing_mm2: (depth_mm * mm_per_px).powi(2),
+            }
+        });
+        Ok(Self {
+            name: name.into(),
+            size,
+            px_per_mm: f64::from(camera.px_per_unit(size) / mm_per_unit),
+            pixels: pixels.collect(),
+            skin,
+            irradiance: g.irradiance.clone(),
+            depth: g.depth.clone(),
+            profile_id: g.profile_id.clone(),
+            projection: camera.projection(size),
+            mm_per_unit,
+            albedo: gpu.read(&g.albedo).into_iter().map(rgb).collect(),
+            stride: 1,
+            surface: Surface::Head(Box::new(Head { renderer, camera })),
+        })
+    }
+
+    /// As methods take it.
+    pub fn frame(&self) -> Frame<'_> {
+        let projection = self.projection.to_cols_array_2d();
+        let mut frame = Frame::new(&self.irradiance, &self.depth, projection);
+        frame.profile_id = Some(&self.profile_id);
+        frame.mm_per_unit = self.mm_per_unit;
+        frame
+    }
+
+    /// Size of the pictures of the pixels that the truth is asked for.
+    pub fn asked_size(&self) -> [u32; 2] {
+        self.size.map(|s| s.div_ceil(self.stride))
+    }
+
+    /// Of a value for every pixel, those of the pixels that the truth is asked for.
+    pub fn asked<T: Copy>(&self, values: &[T]) -> Vec<T> {
+        let stride = self.stride as usize;
+        let rows = values.chunks(self.size[0] as usize).step_by(stride);
+        rows.flat_map(|row| row.iter().step_by(stride).copied())
+            .collect()
+    }
+}
+
+pub fn rgb([r, g, b, _]: [f32; 4]) -> Vec3 {
+    Vec3::new(r, g, b)
+}
+
+/// Corners of a primitive's triangles in mm.
+pub fn vertices_mm(primitive: &Primitive, mm_per_unit: f32) -> impl Iterator<Item = Vec3> {
+    let positions = primitive.vertices.iter().map(|v| Vec3::from(v.position));
+    positions.map(move |p| p * mm_per_unit)
+}
+
+/// From so far away that a pixel is a third of a centimetre.
+fn far(near: Camera, size: [u32; 2], mm_per_unit: f32) -> Camera {
+    const PX_PER_MM: f32 = 0.3;
+    let closer = near.px_per_unit(size) / (PX_PER_MM * mm_per_unit);
+    Camera {
+        eye: near.target + (near.eye - near.target) * closer,
+        ..near
+    }
+}
+
+/// What a ray along −Z finds: point, normal, irradiance, and the light that Eq. 7 scatters there.
+struct Hit {
+    point_mm: DVec3,
+    normal: DVec3,
+    irradiance: f64,
+    scattered: DVec3,
+}
+
+/// A ball of 10 mm, lit from the side, across half of the picture's height.
+fn sphere(gpu: &Gpu, size: [u32; 2], stride: u32) -> Scene {
+    const RHO_MM: f64 = 10.0;
+    let px_per_mm = 0.25 * f64::from(size[1]) / RHO_MM;
+    let light = DVec3::new(1.0, 0.0, 1.0).normalize();
+    let scattered = closed_form::scattered_cosine(RHO_MM, &Profile::SKIN);
+    orthographic(gpu, "sphere".into(), size, px_per_mm, stride, |at| {
+        let z2 = RHO_MM * RHO_MM - at.length_squared();
+        (z2 > 0.0).then(|| {
+            let point_mm = at.extend(z2.sqrt());
+            let normal = point_mm / RHO_MM;
+            let cosine = normal.dot(light);
+            Hit {
+                point_mm,
+                normal,
+                irradiance: cosine.max(0.0),
+                scattered: scattered(cosine),
+            }
+        })
+    })
+}
+
+/// A plane that faces the camera: where it is skin, and its light.
+pub fn flat(
+    gpu: &Gpu,
+    name: &str,
+    size: [u32; 2],
+    px_per_mm: f64,
+    irradiance: impl Fn(DVec2) -> Option<f64>,
+) -> Scene {
+    orthographic(gpu, name.into(), size, px_per_mm, 1, |at| {
+        Some(Hit {
+            point_mm: at.extend(0.0),
+            normal: DVec3::Z,
+            irradiance: irradiance(at)?,
+            // Nobody asks.
+            scattered: DVec3::NAN,
+        })
+    })
+}
+
+/// A straight edge, soft by σ = 1 px, at 30°, over a whole frame of skin.
+fn edge(gpu: &Gpu, size: [u32; 2], sigma_px: f64, stride: u32) -> Scene {
+    let px_per_mm = sigma_px / RED_SIGMA_MM;
+    let blur_mm2 = px_per_mm.powi(-2);
+    let across = DVec2::from_angle(30f64.to_radians());
+    let sparse = if sigma_px < SPARSE_FROM_PX { 1 } else { SPARSE };
+    let stride = stride * sparse;
+    let name = format!("edge_{sigma_px}");
+    orthographic(gpu, name, size, px_per_mm, stride, |at| {
+        let x = at.dot(across);
+        Some(Hit {
+            point_mm: at.extend(0.0),
+            normal: DVec3::Z,
+            irradiance: closed_form::step(x, blur_mm2),
+            scattered: closed_form::scattered_step(x, blur_mm2, &Profile::SKIN),
+        })
+    })
+}
+
+/// A surface over the xy plane, seen along −Z from half a metre, in mm.
+fn orthographic(
+    gpu: &Gpu,
+    name: String,
+    size: [u32; 2],
+    px_per_mm: f64,
+    stride: u32,
+    hit: impl Fn(DVec2) -> Option<Hit>,
+) -> Scene {
+    let half = DVec2::new(size[0].into(), size[1].into()) / px_per_mm / 2.0;
+    // Reversed depth from 0 at 1000 mm to 1 at the eye.
+    let projection = DMat4::from_cols(
+        DVec4::new(1.0 / half.x, 0.0, 0.0, 0.0),
+        DVec4::new(0.0, 1.0 / half.y, 0.0, 0.0),
+        DVec4::new(0.0, 0.0, 1e-3, 0.0),
+        DVec4::new(0.0, 0.0, 1.0, 1.0),
+    );
+    let (mut irradiance, mut depth, mut id) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut skin, mut pixels, mut known) = (Vec::new(), Vec::new(), Vec::new());
+    for y in 0..size[1] {
+        for x in 0..size[0] {
+            let at = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) / px_per_mm - half;
+            let found = hit(DVec2::new(at.x, -at.y));
+            let e = found.as_ref().map_or(0.0, |h| h.irradiance);
+            let bits = [e, e, e, 1.0].map(|c| f16::from_f64(c).to_bits());
+            irradiance.push(bits);
+            depth.push(found.as_ref().map_or(0.0, |h| {
+                (projection.z_axis.z * (h.point_mm.z - 500.0) + 1.0) as f32
+            }));
+            id.push(u8::from(found.is_some()));
+            skin.push(found.is_some());
+            if let Some(h) = found {
+                let facing_mm2 = px_per_mm.powi(-2);
+                pixels.push(Pixel {
+                    patch: Patch {
+                        point_mm: h.point_mm.as_vec3(),
+                        area_mm2: (facing_mm2 / h.normal.z) as f32,
+                        irradiance: Vec3::splat(f16::from_bits(bits[0]).to_f32()),
+                    },
+                    facing_mm2: facing_mm2 as f32,
+                });
+                known.push(h.scattered.as_vec3());
+            }
+        }
+    }
+    Scene {
+        irradiance: gpu.upload("irradiance", size, TextureFormat::Rgba16Float, &irradiance),
+        depth: gpu.upload("depth", size, TextureFormat::R32Float, &depth),
+        profile_id: gpu.upload("profile id", size, TextureFormat::R8Uint, &id),
+        albedo: vec![Vec3::ONE; skin.len()],
+        name,
+        size,
+        px_per_mm,
+        projection: projection.as_mat4(),
+        mm_per_unit: 1.0,
+        skin,
+        pixels,
+        stride,
+        surface: Surface::Known(known),
+    }
+}

@@ -1,0 +1,576 @@
+//! Renders a head three ways — no scattering, texture space, screen space — measures how far
+//! they are apart, and writes pictures, layers and a report.
+//!
+//! ```sh
+//! cargo run --release --example compare
+//! ```
+
+mod report;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use crate::Error;
+use glam::{Mat4, Vec3, Vec4};
+use image::RgbImage;
+use indicatif::{ProgressBar, ProgressStyle};
+use subsurface::{DEFAULT_MAX_ERROR, Plan, Profile, TextureSpace, wgpu};
+
+use crate::method::{self, Ours};
+
+use crate::metrics::{self, Layer};
+use crate::output;
+use crate::renderer::{
+    AtlasRenderer, Camera, Gpu, Layer as Shown, Lighting, Renderer, Scene, Specular, View,
+};
+use report::{DIFFERENCE_GAIN, ModeReport, Report};
+
+/// Runs that a median is taken of: this many, or as many as fit into this time.
+const TIMED_RUNS: usize = 5;
+const TIMED_SECONDS: f64 = 10.0;
+
+/// Gaussians narrower than this, in texels, are lost in an atlas.
+const RESOLVED_TEXELS: f32 = 0.6;
+
+const HELP: &str = "\
+Renders a head without scattering, scattered in texture space and scattered in screen space.
+
+Usage: cargo run --release --example compare -- [OPTIONS]
+
+  --model FILE        a .glb or .gltf file                        [the built-in head]
+  --size WxH          of the pictures, in pixels                  [512x512]
+  --view VIEW         front, three-quarter, profile or close-up   [front]
+  --profile FILE      a diffusion profile in JSON                 [skin, six Gaussians]
+  --mm-per-unit X     length of a scene unit in mm                [1000: metres]
+  --specular FORM     kelemen or li-shao                          [kelemen]
+  --texture-size N    of the atlas, in texels                     [2048]
+  --exposure X        of the pictures                             [1]
+  --out DIR           where the report goes                       [out/compare]
+";
+
+struct Options {
+    model: Option<PathBuf>,
+    size: [u32; 2],
+    view: View,
+    view_name: String,
+    profile: Profile,
+    mm_per_unit: f32,
+    specular: Specular,
+    texture_size: u32,
+    exposure: f32,
+    out: PathBuf,
+}
+
+pub fn main() -> ExitCode {
+    match options().and_then(|options| options.map_or(Ok(()), |o| compare(&o))) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The command line; `None` when it asked for help.
+fn options() -> Result<Option<Options>, Error> {
+    use lexopt::prelude::*;
+
+    let mut options = Options {
+        model: None,
+        size: [512, 512],
+        view: View::Front,
+        view_name: "front".into(),
+        profile: Profile::SKIN,
+        mm_per_unit: 1000.0,
+        specular: Specular::Kelemen,
+        texture_size: 2048,
+        exposure: 1.0,
+        out: "out/compare".into(),
+    };
+    let mut parser = lexopt::Parser::from_env();
+    let refused = |e: lexopt::Error| {
+        Error::new(
+            "command line",
+            format!("\"{e}\""),
+            "options as --help lists them",
+        )
+    };
+    while let Some(arg) = parser.next().map_err(refused)? {
+        let Long(name) = &arg else {
+            if let Short('h') = arg {
+                print!("{HELP}");
+                return Ok(None);
+            }
+            return Err(refused(arg.unexpected()));
+        };
+        let name = name.to_string();
+        if name == "help" {
+            print!("{HELP}");
+            return Ok(None);
+        }
+        let mut text = || -> Result<String, Error> {
+            parser.value().and_then(|v| v.string()).map_err(refused)
+        };
+        match name.as_str() {
+            "model" => options.model = Some(text()?.into()),
+            "out" => options.out = text()?.into(),
+            "size" => options.size = size(&text()?)?,
+            "view" => {
+                options.view_name = text()?;
+                options.view = options.view_name.parse()?;
+            }
+            "profile" => options.profile = profile(&text()?)?,
+            "specular" => options.specular = text()?.parse()?,
+            "mm-per-unit" => options.mm_per_unit = positive("--mm-per-unit", &text()?)?,
+            "exposure" => options.exposure = positive("--exposure", &text()?)?,
+            "texture-size" => {
+                let text = text()?;
+                options.texture_size = text
+                    .parse()
+                    .map_err(|_| Error::new("--texture-size", text, "a whole number of texels"))?;
+            }
+            _ => {
+                return Err(refused(lexopt::Error::UnexpectedOption(format!(
+                    "--{name}"
+                ))));
+            }
+        }
+    }
+    Ok(Some(options))
+}
+
+fn size(text: &str) -> Result<[u32; 2], Error> {
+    text.split_once('x')
+        .and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]))
+        .ok_or_else(|| Error::new("--size", text, "WIDTHxHEIGHT in pixels, such as 512x512"))
+}
+
+fn positive(input: &str, text: &str) -> Result<f32, Error> {
+    text.parse()
+        .ok()
+        .filter(|x: &f32| x.is_finite() && *x > 0.0)
+        .ok_or_else(|| Error::new(input, text, "a number above 0"))
+}
+
+fn profile(path: &str) -> Result<Profile, Error> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| Error::new(path, format!("\"{e}\""), "a file that can be read"))?;
+    Profile::from_json(&text).map_err(|e| Error::from(e).within(path))
+}
+
+/// A mode's scattered irradiance on the device, and what it cost.
+struct Scattered {
+    name: &'static str,
+    title: &'static str,
+    view: wgpu::TextureView,
+    runs: usize,
+    /// Median over the runs.
+    ms: f64,
+    /// Of `ms`, what the atlas's drawing and its blur take; texture space alone has them.
+    atlas_ms: Option<[f64; 2]>,
+}
+
+fn compare(options: &Options) -> Result<(), Error> {
+    let started = Instant::now();
+    let progress = ProgressBar::new(6).with_style(
+        ProgressStyle::with_template("{bar:24} {msg}").expect("the template is a constant"),
+    );
+    let step = |message: &str| {
+        progress.inc(1);
+        progress.set_message(message.to_owned());
+    };
+
+    step("loading the model");
+    let (model, scene) = match &options.model {
+        Some(path) => (path.display().to_string(), Scene::load(path)?),
+        None => ("built-in head".to_owned(), Scene::from_glb(crate::HEAD)?),
+    };
+    let gpu = Gpu::headless()?;
+    let renderer = Renderer::new(&gpu, &scene, options.size)?;
+
+    step("drawing and lighting");
+    let camera = Camera::framing(&scene, options.view, options.size);
+    let lighting = Lighting {
+        specular: options.specular,
+        ..Default::default()
+    };
+    renderer.render(&gpu, &camera, &lighting, options.mm_per_unit)?;
+
+    step("scattering in screen space");
+    let none = Scattered {
+        name: "none",
+        title: "no scattering",
+        view: renderer.gbuffer.irradiance.clone(),
+        runs: 0,
+        ms: 0.0,
+        atlas_ms: None,
+    };
+    let plan = Plan::new(&[options.profile], DEFAULT_MAX_ERROR)?;
+    let exact = Plan::exact(&[options.profile])?;
+    let by = |mode, plan| scatter_screen(&gpu, &renderer, &camera, options, mode, plan);
+    let planned = by(("screen_planned", "screen space, a plan at 1/255"), &plan)?;
+    let exact = by(("screen_space", "screen space, exact"), &exact)?;
+
+    step("scattering in texture space");
+    let mut unavailable = Vec::new();
+    let mut modes = vec![none];
+    let atlas = AtlasRenderer::new(&gpu, &renderer, options.texture_size)?;
+    match scatter_texture(&gpu, &renderer, atlas, options) {
+        Ok(texture) => modes.push(texture),
+        Err(error) => unavailable.push(("texture space", error.to_string())),
+    }
+    modes.extend([planned, exact]);
+
+    step("measuring");
+    let frame = Skin::read(&gpu, &renderer, &camera, options);
+    let mm_per_texel = mm_per_texel(&scene, options);
+    let finest = mm_per_texel
+        .iter()
+        .map(|(_, mm)| *mm)
+        .fold(f32::INFINITY, f32::min);
+    let coarsest = mm_per_texel.iter().map(|(_, mm)| *mm).fold(0.0, f32::max);
+    let measured = measure(&gpu, &renderer, &frame, &modes, options);
+    let runs: Vec<_> = modes
+        .iter()
+        .filter(|m| m.runs > 0)
+        .map(|m| format!("{} of {}", m.title, m.runs))
+        .collect();
+    let mut notes = vec![format!(
+        "Timings are medians of runs, submit and wait ({}); on a software driver they compare \
+         the modes with each other, not with a GPU.",
+        runs.join(", ")
+    )];
+    if finest < coarsest {
+        notes.push(format!(
+            "The primitives differ: {finest:.3} to {coarsest:.3} mm a texel; the coarsest is given."
+        ));
+    }
+    let report = Report {
+        adapter: gpu.adapter.clone(),
+        size: options.size,
+        model,
+        attribution: options
+            .model
+            .is_none()
+            .then(|| "MakeHuman base mesh and targets, CC0 1.0".into()),
+        view: options.view_name.clone(),
+        skin_pixels: frame.skin.iter().filter(|skin| **skin).count(),
+        mm_per_px: f64::from(options.mm_per_unit / camera.px_per_unit(options.size)),
+        mm_per_texel: coarsest.into(),
+        texture_size: options.texture_size,
+        unresolved: unresolved(&mm_per_texel, &options.profile),
+        notes,
+        command: std::iter::once("compare".to_owned())
+            .chain(std::env::args().skip(1))
+            .collect::<Vec<_>>()
+            .join(" "),
+        modes: measured.reports,
+        unavailable,
+    };
+
+    step("writing the report");
+    let files = files(&report, &measured.layers)
+        .map_err(|e| Error::new("report", format!("\"{e}\""), "pictures that can be encoded"))?;
+    output::write(&options.out, &files).map_err(|e| {
+        Error::new(
+            "--out",
+            format!("\"{e}\""),
+            "a directory that can be written to",
+        )
+    })?;
+    progress.finish_and_clear();
+    println!("{}", report::table(&report));
+    println!(
+        "{} in {:.1} s",
+        options.out.join("report.html").display(),
+        started.elapsed().as_secs_f64()
+    );
+    Ok(())
+}
+
+fn scatter_screen(
+    gpu: &Gpu,
+    renderer: &Renderer,
+    camera: &Camera,
+    options: &Options,
+    (name, title): (&'static str, &'static str),
+    plan: &Plan,
+) -> Result<Scattered, Error> {
+    let output = renderer.scattered_target(gpu);
+    let projection = camera.projection(options.size);
+    let frame = renderer.gbuffer.frame(projection, options.mm_per_unit);
+    let mut ours = Ours::new(&gpu.device, output.texture().format(), plan)?;
+    let mut times = Vec::new();
+    let timed = Instant::now();
+    while more_runs(times.len(), timed) {
+        let start = Instant::now();
+        method::scatter(gpu, &mut ours, &frame, &output)?;
+        times.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+    Ok(Scattered {
+        name,
+        title,
+        view: output,
+        runs: times.len(),
+        ms: median(&mut times),
+        atlas_ms: None,
+    })
+}
+
+/// Fails only where the model has no UVs for it.
+fn scatter_texture(
+    gpu: &Gpu,
+    renderer: &Renderer,
+    atlas: AtlasRenderer,
+    options: &Options,
+) -> Result<Scattered, Error> {
+    let output = renderer.scattered_target(gpu);
+    let format = output.texture().format();
+    let mut effect = TextureSpace::new(&gpu.device, format, &[options.profile])?;
+    let (mut raster, mut blur, mut both) = (Vec::new(), Vec::new(), Vec::new());
+    let timed = Instant::now();
+    while more_runs(both.len(), timed) {
+        let mut blur_ms = 0.0;
+        let raster_ms = atlas.render(
+            gpu,
+            renderer,
+            1,
+            options.mm_per_unit,
+            &output,
+            |atlas, to| {
+                let start = Instant::now();
+                method::scatter_atlas(gpu, &mut effect, atlas, to)?;
+                blur_ms += start.elapsed().as_secs_f64() * 1e3;
+                Ok(())
+            },
+        )?;
+        raster.push(raster_ms);
+        blur.push(blur_ms);
+        both.push(raster_ms + blur_ms);
+    }
+    Ok(Scattered {
+        name: "texture_space",
+        title: "texture space",
+        view: output,
+        runs: both.len(),
+        ms: median(&mut both),
+        atlas_ms: Some([median(&mut raster), median(&mut blur)]),
+    })
+}
+
+fn more_runs(done: usize, since: Instant) -> bool {
+    done == 0 || (done < TIMED_RUNS && since.elapsed().as_secs_f64() < TIMED_SECONDS)
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// What the measures need of the G-buffer.
+struct Skin {
+    skin: Vec<bool>,
+    /// Surface area that a pixel shows, up to a common factor.
+    area: Vec<f64>,
+    albedo: Vec<Vec3>,
+}
+
+impl Skin {
+    fn read(gpu: &Gpu, renderer: &Renderer, camera: &Camera, options: &Options) -> Self {
+        let g = &renderer.gbuffer;
+        let skin: Vec<bool> = gpu
+            .read_bytes(g.profile_id.texture())
+            .iter()
+            .map(|id| *id == 1) // the one profile
+            .collect();
+        let depth: Vec<f32> = bytemuck::pod_collect_to_vec(&gpu.read_bytes(g.depth.texture()));
+        let inverse = camera
+            .projection(options.size)
+            .as_dmat4()
+            .inverse()
+            .as_mat4();
+        let area = depth
+            .iter()
+            .zip(gpu.read(&g.normal))
+            .enumerate()
+            .map(|(i, (depth, normal))| area(i, *depth, normal, inverse, options.size))
+            .collect();
+        let albedo = gpu
+            .read(&g.albedo)
+            .iter()
+            .map(|p| Vec4::from(*p).truncate())
+            .collect();
+        Self { skin, area, albedo }
+    }
+}
+
+/// z³/|n·p| of a pinhole camera (numerator and denominator in view space). Interpolated normals
+/// lean away at silhouettes, where this has no bound: there a pixel counts for ten.
+fn area(i: usize, depth: f32, normal: [f32; 4], inverse: Mat4, size: [u32; 2]) -> f64 {
+    if depth == 0.0 {
+        return 0.0;
+    }
+    let pixel = [i as u32 % size[0], i as u32 / size[0]];
+    let uv = [0, 1].map(|k| (pixel[k] as f32 + 0.5) / size[k] as f32);
+    let p = inverse.project_point3(Vec3::new(2.0 * uv[0] - 1.0, 1.0 - 2.0 * uv[1], depth));
+    let facing = (Vec4::from(normal).truncate().dot(p) / p.length()).abs();
+    f64::from(p.z.abs().powi(3) / (facing.max(0.1) * p.length()))
+}
+
+/// Width of a texel on the skin in mm, for each primitive that scatters, on its fullest page.
+fn mm_per_texel(scene: &Scene, options: &Options) -> Vec<(String, f32)> {
+    scene
+        .primitives
+        .iter()
+        .filter(|p| scene.materials[p.material].profile_id == 1)
+        .map(|p| {
+            let page = (0..p.pages.len()).max_by_key(|i| p.pages[*i].len());
+            let texel = page.map_or(0.0, |page| p.texel_size(page, options.texture_size));
+            (p.name.clone(), texel * options.mm_per_unit)
+        })
+        .filter(|(_, mm)| *mm > 0.0)
+        .collect()
+}
+
+fn unresolved(mm_per_texel: &[(String, f32)], profile: &Profile) -> Vec<String> {
+    let mut found = Vec::new();
+    for (name, mm) in mm_per_texel {
+        for g in profile.gaussians() {
+            let sigma_mm = g.variance_mm2.sqrt();
+            if sigma_mm < RESOLVED_TEXELS * mm {
+                found.push(format!(
+                    "σ {sigma_mm:.3} mm is {:.2} texels on {name}",
+                    sigma_mm / mm
+                ));
+            }
+        }
+    }
+    found
+}
+
+struct Measured {
+    reports: Vec<ModeReport>,
+    /// Name of the mode, scattered irradiance.
+    layers: Vec<(&'static str, Layer)>,
+}
+
+fn measure(
+    gpu: &Gpu,
+    renderer: &Renderer,
+    frame: &Skin,
+    modes: &[Scattered],
+    options: &Options,
+) -> Measured {
+    let [width, height] = options.size;
+    let layer = |pixels: Vec<[f32; 3]>| Layer {
+        width,
+        height,
+        pixels,
+    };
+    let irradiance: Vec<Layer> = modes
+        .iter()
+        .map(|m| {
+            layer(
+                gpu.read(&m.view)
+                    .iter()
+                    .map(|p| [p[0], p[1], p[2]])
+                    .collect(),
+            )
+        })
+        .collect();
+    let radiance: Vec<Layer> = irradiance
+        .iter()
+        .map(|e| {
+            let lit = e.pixels.iter().zip(&frame.albedo);
+            layer(lit.map(|(e, a)| (Vec3::from(*e) * *a).to_array()).collect())
+        })
+        .collect();
+    let picture = |m: &Scattered, shown| {
+        let pixels = renderer.compose(gpu, &m.view, shown, options.exposure);
+        RgbImage::from_raw(width, height, pixels.into_flattened())
+            .expect("the renderer gives a picture of its size")
+    };
+    let pictures: Vec<_> = modes.iter().map(|m| picture(m, Shown::Picture)).collect();
+
+    // The rim of a silhouette is left out: there a pixel's E is as much of the edge as of the skin.
+    let inner = metrics::erode(&frame.skin, width, height, 2);
+    let reference = modes.iter().position(|m| m.name == "texture_space");
+    let scattered = reference.map(|r| {
+        let pairs = irradiance[r].pixels.iter().zip(&irradiance[0].pixels);
+        pairs
+            .zip(&inner)
+            .map(|((a, b), inner)| {
+                *inner && (Vec3::from(*a) - Vec3::from(*b)).abs().max_element() > 0.01
+            })
+            .collect::<Vec<_>>()
+    });
+    let energy = |e: &Layer| -> f64 {
+        let pixels = e.pixels.iter().zip(&frame.area).zip(&frame.skin);
+        pixels
+            .filter(|(_, skin)| **skin)
+            .map(|((e, area), _)| f64::from(e.iter().sum::<f32>()) * area)
+            .sum()
+    };
+
+    let mut reports = Vec::new();
+    for (i, mode) in modes.iter().enumerate() {
+        let flip = reference.map(|r| metrics::flip_mean(&pictures[i], &pictures[r], &inner));
+        reports.push(ModeReport {
+            name: mode.name,
+            title: mode.title,
+            ms: mode.ms,
+            ms_raster: mode.atlas_ms.map(|[raster, _]| raster),
+            ms_blur: mode.atlas_ms.map(|[_, blur]| blur),
+            rel_rmse: reference
+                .and_then(|r| metrics::relative_rmse(&irradiance[i], &irradiance[r], &inner)),
+            rel_rmse_scattered: reference
+                .zip(scattered.as_ref())
+                .and_then(|(r, mask)| metrics::relative_rmse(&irradiance[i], &irradiance[r], mask)),
+            max_error: reference
+                .and_then(|r| metrics::max_error(&irradiance[i], &irradiance[r], &inner)),
+            delta_e2000_p99: reference.and_then(|r| {
+                metrics::delta_e2000_percentile(&radiance[i], &radiance[r], &inner, 0.99)
+            }),
+            flip_mean: flip.as_ref().and_then(|(mean, _)| *mean),
+            energy_ratio: Some(energy(&irradiance[i]) / energy(&irradiance[0]))
+                .filter(|ratio| ratio.is_finite()),
+            picture: pictures[i].clone(),
+            diffuse: picture(mode, Shown::Diffuse),
+            difference: reference
+                .map(|r| metrics::difference(&irradiance[i], &irradiance[r], DIFFERENCE_GAIN)),
+            flip: flip.map(|(_, heat)| heat),
+        });
+    }
+    let names = modes.iter().map(|m| m.name);
+    Measured {
+        reports,
+        layers: names.zip(irradiance).collect(),
+    }
+}
+
+fn files(
+    report: &Report,
+    layers: &[(&'static str, Layer)],
+) -> image::ImageResult<Vec<(String, Vec<u8>)>> {
+    let mut files = Vec::new();
+    for mode in &report.modes {
+        let pictures = [
+            ("picture", Some(&mode.picture)),
+            ("diffuse", Some(&mode.diffuse)),
+            ("difference", mode.difference.as_ref()),
+            ("flip", mode.flip.as_ref()),
+        ];
+        for (what, picture) in pictures {
+            if let Some(picture) = picture {
+                files.push((format!("{}_{what}.png", mode.name), output::png(picture)?));
+            }
+        }
+    }
+    for (name, layer) in layers {
+        files.push((format!("{name}_diffuse.exr"), report::exr(layer)?));
+    }
+    files.push(("report.json".into(), report::json(report).into_bytes()));
+    files.push(("report.html".into(), report::html(report)?.into_bytes()));
+    Ok(files)
+}

@@ -1,0 +1,214 @@
+//! A device without a window, and the way of pixels to it and back.
+
+use wgpu::util::{DeviceExt, TextureBlitter};
+use wgpu::{TextureFormat, TextureUsages, TextureView};
+
+use crate::Error;
+
+/// A headless device, at WebGPU's default limits and without any feature: what the effects need
+/// at most.
+pub struct Gpu {
+    /// The adapter's name and driver.
+    pub adapter: String,
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+    to_float: TextureBlitter,
+}
+
+impl Gpu {
+    /// The adapter that wgpu prefers, or the one that `WGPU_ADAPTER_NAME` names a part of.
+    ///
+    /// # Errors
+    /// No adapter, or one that gives no device.
+    pub fn headless() -> Result<Self, Error> {
+        pollster::block_on(async {
+            let no_adapter = |e: &dyn std::fmt::Display| {
+                Error::new(
+                    "graphics adapter",
+                    format!("none ({})", e.to_string().replace('\n', " ")),
+                    "a Vulkan, Metal or DirectX 12 driver; on Linux ./setup installs one",
+                )
+            };
+            let instance = wgpu::Instance::new(
+                wgpu::InstanceDescriptor::new_without_display_handle_from_env(),
+            );
+            let adapter = match wgpu::util::initialize_adapter_from_env(&instance, None).await {
+                Ok(adapter) => adapter,
+                Err(_) => instance
+                    .request_adapter(&wgpu::RequestAdapterOptions {
+                        power_preference: wgpu::PowerPreference::HighPerformance,
+                        ..Default::default()
+                    })
+                    .await
+                    .map_err(|e| no_adapter(&e))?,
+            };
+            let (device, queue) = adapter
+                .request_device(&wgpu::DeviceDescriptor {
+                    label: Some("subsurface_lab::Gpu"),
+                    ..Default::default()
+                })
+                .await
+                .map_err(|e| no_adapter(&e))?;
+            let info = adapter.get_info();
+            Ok(Self {
+                adapter: format!("{} ({:?}, {})", info.name, info.backend, info.driver_info),
+                to_float: TextureBlitter::new(&device, TextureFormat::Rgba32Float),
+                device,
+                queue,
+            })
+        })
+    }
+
+    /// Whether pictures of this size can be rendered and read back.
+    ///
+    /// # Errors
+    /// A size of 0 or beyond the device's limits.
+    pub fn check_size(&self, size: [u32; 2]) -> Result<(), Error> {
+        let limits = self.device.limits();
+        let limit = limits.max_texture_dimension_2d;
+        // Pictures are read back as full floats, in rows of a multiple of 256 bytes.
+        let bytes = u64::from(size[0].div_ceil(16)) * 256 * u64::from(size[1]);
+        if size.iter().any(|&s| s == 0 || s > limit) || bytes > limits.max_buffer_size {
+            return Err(Error::new(
+                "size",
+                format!("{}x{}", size[0], size[1]),
+                format!(
+                    "1 to {limit} pixels each way, {} in all",
+                    limits.max_buffer_size / 16
+                ),
+            ));
+        }
+        Ok(())
+    }
+
+    /// A texture of its own that passes render to and read from, and that can be copied out.
+    pub fn target(&self, label: &str, size: [u32; 2], format: TextureFormat) -> TextureView {
+        self.device
+            .create_texture(&descriptor(
+                label,
+                size,
+                format,
+                TextureUsages::RENDER_ATTACHMENT,
+            ))
+            .create_view(&Default::default())
+    }
+
+    /// A texture that holds `texels`, row by row.
+    ///
+    /// # Panics
+    /// Where `texels` are not of the format and size.
+    pub fn upload<T: bytemuck::Pod>(
+        &self,
+        label: &str,
+        size: [u32; 2],
+        format: TextureFormat,
+        texels: &[T],
+    ) -> TextureView {
+        self.device
+            .create_texture_with_data(
+                &self.queue,
+                &descriptor(label, size, format, TextureUsages::empty()),
+                Default::default(),
+                bytemuck::cast_slice(texels),
+            )
+            .create_view(&Default::default())
+    }
+
+    /// A uniform buffer for one `T`.
+    pub(super) fn uniform<T: bytemuck::Pod>(&self, label: &str) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: size_of::<T>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// Submits what `record` records and waits until it is done. Returns what that returns.
+    pub fn run<T>(&self, record: impl FnOnce(&mut wgpu::CommandEncoder) -> T) -> T {
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        let result = record(&mut encoder);
+        self.queue.submit([encoder.finish()]);
+        self.wait();
+        result
+    }
+
+    /// The pixels of a float texture, row by row, red to alpha.
+    pub fn read(&self, view: &TextureView) -> Vec<[f32; 4]> {
+        let size = [view.texture().width(), view.texture().height()];
+        let copy = self.target("subsurface_lab::Gpu copy", size, TextureFormat::Rgba32Float);
+        self.run(|encoder| self.to_float.copy(&self.device, encoder, view, &copy));
+        bytemuck::pod_collect_to_vec(&self.read_bytes(copy.texture()))
+    }
+
+    /// The bytes of an uncompressed texture, row by row.
+    pub fn read_bytes(&self, texture: &wgpu::Texture) -> Vec<u8> {
+        let texel = texture.format().block_copy_size(None).unwrap_or(0);
+        let row = texture.width() * texel;
+        let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("subsurface_lab::Gpu readback"),
+            size: u64::from(padded) * u64::from(texture.height()),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &buffer,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(padded),
+                    rows_per_image: None,
+                },
+            },
+            texture.size(),
+        );
+        self.queue.submit([encoder.finish()]);
+        buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+        self.wait();
+        let bytes = buffer
+            .slice(..)
+            .get_mapped_range()
+            .expect("a readback buffer is mapped once the device has been waited for");
+        bytes
+            .chunks_exact(padded as usize)
+            .flat_map(|r| &r[..row as usize])
+            .copied()
+            .collect()
+    }
+
+    fn wait(&self) {
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .expect("a headless device is only lost with its driver");
+    }
+}
+
+fn descriptor<'a>(
+    label: &'a str,
+    size: [u32; 2],
+    format: TextureFormat,
+    usage: TextureUsages,
+) -> wgpu::TextureDescriptor<'a> {
+    wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d {
+            width: size[0],
+            height: size[1],
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: usage
+            | TextureUsages::TEXTURE_BINDING
+            | TextureUsages::COPY_SRC
+            | TextureUsages::COPY_DST,
+        view_formats: &[],
+    }
+}

@@ -1,0 +1,466 @@
+//! Lights, sky and surface reflection, with the shadow maps that they need. Driver of
+//! `lighting.wgsl` and `shadow.wgsl`.
+
+use std::f32::consts::PI;
+use std::str::FromStr;
+
+use crate::Error;
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, Vec3, Vec4};
+
+use super::mesh::Mesh;
+use super::{DEPTH, Gpu};
+
+/// Side of the shadow maps in texels.
+const MAP_SIZE: u32 = 2048;
+
+/// A distant light with an extent, and so with soft shadows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Towards the light; any length but zero.
+    pub direction: Vec3,
+    /// Half the angle under which the light is seen, in degrees, 0 to 10: .27 for the sun.
+    pub radius_degrees: f32,
+    /// Radiance that a white diffuse surface facing the light reflects, linear RGB.
+    pub color: Vec3,
+}
+
+/// Light from all around, as the nine coefficients of irradiance/π over the unit normal: of
+/// 1, y, z, x, xy, yz, 3z² − 1, xz, x² − y².
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sky(pub [Vec3; 9]);
+
+/// The form of the surface reflection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Specular {
+    /// Kelemen & Szirmay-Kalos with Schlick's Fresnel term, as GPU Gems 3 ch. 14 uses it.
+    Kelemen,
+    /// Li & Shao 2015, Eq. 4–6 as printed: Beckmann's distribution times the cosine, no more.
+    LiShao,
+}
+
+impl FromStr for Specular {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self, Error> {
+        match name {
+            "kelemen" => Ok(Self::Kelemen),
+            "li-shao" => Ok(Self::LiShao),
+            _ => Err(Error::new("specular", name, "kelemen or li-shao")),
+        }
+    }
+}
+
+/// All that lights a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lighting {
+    /// 0 to 4 lights.
+    pub lights: Vec<Light>,
+    /// The sky.
+    pub sky: Sky,
+    /// Form of the surface reflection.
+    pub specular: Specular,
+    /// RMS slope m of the skin's micro-facets, .01 to 1.
+    pub slope: f32,
+    /// Intensity ρ_s of the skin's reflection (Kelemen only).
+    pub intensity: f32,
+    /// Reflectance at normal incidence (Kelemen only): .028 for skin.
+    pub f0: f32,
+}
+
+impl Sky {
+    /// A dim overcast room: cool from above, warm from the floor.
+    pub fn soft() -> Self {
+        let zenith = Vec3::new(0.105, 0.118, 0.145);
+        let horizon = Vec3::new(0.075, 0.076, 0.082);
+        let floor = Vec3::new(0.042, 0.036, 0.032);
+        Self::project(|d| {
+            if d.y > 0.0 {
+                horizon.lerp(zenith, d.y)
+            } else {
+                horizon.lerp(floor, (-3.0 * d.y).min(1.0))
+            }
+        })
+    }
+
+    /// The coefficients of a sky given by its radiance from each direction (Ramamoorthi &
+    /// Hanrahan 2001, Eq. 3 and 10).
+    pub fn project(radiance: impl Fn(Vec3) -> Vec3) -> Self {
+        const SAMPLES: usize = 4096;
+        // Normalisation of each basis function, and the cosine's share A_l/π of its band.
+        let y = [
+            0.282095, 0.488603, 0.488603, 0.488603, 1.092548, 1.092548, 0.315392, 1.092548,
+            0.546274,
+        ];
+        let a = [1.0, 2.0 / 3.0, 0.25];
+        let mut sky = [Vec3::ZERO; 9];
+        for i in 0..SAMPLES {
+            // A Fibonacci spiral.
+            let up = 1.0 - 2.0 * (i as f32 + 0.5) / SAMPLES as f32;
+            let phi = i as f32 * PI * (3.0 - 5f32.sqrt());
+            let around = (1.0 - up * up).sqrt();
+            let d = Vec3::new(around * phi.cos(), up, around * phi.sin());
+            let light = radiance(d) * (4.0 * PI / SAMPLES as f32);
+            for (k, b) in basis(d).into_iter().enumerate() {
+                let band = [0, 1, 1, 1, 2, 2, 2, 2, 2][k];
+                sky[k] += light * b * y[k] * y[k] * a[band];
+            }
+        }
+        Self(sky)
+    }
+}
+
+fn basis(d: Vec3) -> [f32; 9] {
+    [
+        1.0,
+        d.y,
+        d.z,
+        d.x,
+        d.x * d.y,
+        d.y * d.z,
+        3.0 * d.z * d.z - 1.0,
+        d.x * d.z,
+        d.x * d.x - d.y * d.y,
+    ]
+}
+
+impl Default for Lighting {
+    /// A portrait: a warm key from the side, a cool rim from behind, a dim sky.
+    fn default() -> Self {
+        Self {
+            lights: vec![
+                Light {
+                    direction: Vec3::new(-0.82, 0.38, 0.55),
+                    radius_degrees: 3.0,
+                    color: Vec3::new(1.05, 0.98, 0.90),
+                },
+                Light {
+                    direction: Vec3::new(0.80, 0.30, -0.62),
+                    radius_degrees: 4.0,
+                    color: Vec3::new(0.34, 0.42, 0.55),
+                },
+            ],
+            sky: Sky::soft(),
+            specular: Specular::Kelemen,
+            slope: 0.3,
+            intensity: 0.32,
+            f0: 0.028,
+        }
+    }
+}
+
+/// `Light` of the shader.
+#[repr(C)]
+#[derive(Clone, Copy, Default, Pod, Zeroable)]
+pub(super) struct LightUniform {
+    direction: Vec3,
+    tan_radius: f32,
+    color: Vec3,
+    pad: f32,
+    to_map: Mat4,
+}
+
+/// `Lighting` of the shader.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(super) struct LightingUniform {
+    lights: [LightUniform; Lighting::MAX_LIGHTS],
+    sky: [Vec4; 9],
+    map_extent: f32,
+    count: u32,
+    specular_model: u32,
+    specular_intensity: f32,
+    f0: f32,
+    slope: f32,
+    pad: [u32; 2],
+}
+
+impl Lighting {
+    /// The most lights.
+    pub const MAX_LIGHTS: usize = 4;
+
+    fn uniform(&self, bounds: (Vec3, Vec3)) -> Result<LightingUniform, Error> {
+        if self.lights.len() > Self::MAX_LIGHTS {
+            return Err(Error::new(
+                "lights",
+                self.lights.len().to_string(),
+                format!("at most {}", Self::MAX_LIGHTS),
+            ));
+        }
+        let center = (bounds.0 + bounds.1) / 2.0;
+        let extent = 1.02 * bounds.0.distance(bounds.1);
+        let mut lights = [LightUniform::zeroed(); Self::MAX_LIGHTS];
+        for (to, light) in lights.iter_mut().zip(&self.lights) {
+            let Some(direction) = light.direction.try_normalize() else {
+                return Err(Error::new(
+                    "light: direction",
+                    light.direction.to_string(),
+                    "a finite direction",
+                ));
+            };
+            let right = direction.any_orthonormal_vector();
+            let up = direction.cross(right);
+            // Right-handed as seen from the light: x right, y down the map, z away.
+            let rows = [right, -up, -direction].map(|axis| axis / extent);
+            let offset = rows.map(|row| 0.5 - row.dot(center));
+            *to = LightUniform {
+                direction,
+                tan_radius: light.radius_degrees.clamp(0.0, 10.0).to_radians().tan(),
+                color: light.color,
+                pad: 0.0,
+                to_map: Mat4::from_cols(
+                    rows[0].extend(offset[0]),
+                    rows[1].extend(offset[1]),
+                    rows[2].extend(offset[2]),
+                    Vec4::W,
+                )
+                .transpose(),
+            };
+        }
+        Ok(LightingUniform {
+            lights,
+            sky: self.sky.0.map(|c| c.extend(0.0)),
+            map_extent: extent,
+            count: self.lights.len() as u32,
+            specular_model: match self.specular {
+                Specular::Kelemen => 0,
+                Specular::LiShao => 1,
+            },
+            specular_intensity: self.intensity,
+            f0: self.f0,
+            slope: self.slope.clamp(0.01, 1.0),
+            pad: [0; 2],
+        })
+    }
+}
+
+/// The lighting on the device: uniform, shadow maps, and the bind group that shaders read both by.
+pub(super) struct Lights {
+    pub layout: wgpu::BindGroupLayout,
+    pub group: wgpu::BindGroup,
+    uniform: wgpu::Buffer,
+    maps: wgpu::Texture,
+    pipeline: wgpu::RenderPipeline,
+    map_layout: wgpu::BindGroupLayout,
+}
+
+impl Lights {
+    pub fn new(gpu: &Gpu) -> Self {
+        let device = &gpu.device;
+        let label = Some("subsurface_lab::renderer lighting");
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label,
+            entries: &[
+                super::uniform_entry(wgpu::ShaderStages::FRAGMENT),
+                wgpu::BindGroupLayoutEntry {
+                    binding: 1,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Texture {
+                        sample_type: wgpu::TextureSampleType::Depth,
+                        view_dimension: wgpu::TextureViewDimension::D2Array,
+                        multisampled: false,
+                    },
+                    count: None,
+                },
+                wgpu::BindGroupLayoutEntry {
+                    binding: 2,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison),
+                    count: None,
+                },
+            ],
+        });
+        let maps = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("subsurface_lab::renderer shadow maps"),
+            size: wgpu::Extent3d {
+                width: MAP_SIZE,
+                height: MAP_SIZE,
+                depth_or_array_layers: Lighting::MAX_LIGHTS as u32,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: DEPTH,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        });
+        let uniform = gpu.uniform::<LightingUniform>("subsurface_lab::renderer lighting");
+        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
+            label,
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            compare: Some(wgpu::CompareFunction::LessEqual),
+            ..Default::default()
+        });
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label,
+            layout: &layout,
+            entries: &[
+                wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: uniform.as_entire_binding(),
+                },
+                wgpu::BindGroupEntry {
+                    binding: 1,
+                    resource: wgpu::BindingResource::TextureView(&maps.create_view(
+                        &wgpu::TextureViewDescriptor {
+                            dimension: Some(wgpu::TextureViewDimension::D2Array),
+                            ..Default::default()
+                        },
+                    )),
+                },
+                wgpu::BindGroupEntry {
+                    binding: 2,
+                    resource: wgpu::BindingResource::Sampler(&sampler),
+                },
+            ],
+        });
+
+        let label = Some("subsurface_lab::renderer shadow");
+        let shader = device.create_shader_module(wgpu::include_wgsl!("shadow.wgsl"));
+        let map_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label,
+            entries: &[super::uniform_entry(wgpu::ShaderStages::VERTEX)],
+        });
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label,
+            bind_group_layouts: &[Some(&map_layout)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label,
+            layout: Some(&pipeline_layout),
+            vertex: wgpu::VertexState {
+                module: &shader,
+                entry_point: Some("vs_shadow"),
+                compilation_options: Default::default(),
+                buffers: &[Mesh::VERTEX_LAYOUT],
+            },
+            primitive: Default::default(),
+            depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Less, true)),
+            multisample: Default::default(),
+            fragment: None,
+            multiview_mask: None,
+            cache: None,
+        });
+        Self {
+            layout,
+            group,
+            uniform,
+            maps,
+            pipeline,
+            map_layout,
+        }
+    }
+
+    /// Uploads the lights and draws their shadow maps.
+    pub fn render(
+        &self,
+        gpu: &Gpu,
+        lighting: &Lighting,
+        meshes: &[Mesh],
+        bounds: (Vec3, Vec3),
+    ) -> Result<(), Error> {
+        let uniform = lighting.uniform(bounds)?;
+        gpu.queue
+            .write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
+        gpu.run(|encoder| {
+            for (layer, light) in uniform.lights[..uniform.count as usize].iter().enumerate() {
+                // Map coordinates to clip space: x and y from 0..1 to −1..1, y turned up.
+                let to_clip = Mat4::from_cols(
+                    2.0 * Vec4::X,
+                    -2.0 * Vec4::Y,
+                    Vec4::Z,
+                    Vec4::new(-1.0, 1.0, 0.0, 1.0),
+                ) * light.to_map;
+                let buffer = gpu.uniform::<Mat4>("subsurface_lab::renderer shadow");
+                gpu.queue
+                    .write_buffer(&buffer, 0, bytemuck::bytes_of(&to_clip));
+                let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some("subsurface_lab::renderer shadow"),
+                    layout: &self.map_layout,
+                    entries: &[wgpu::BindGroupEntry {
+                        binding: 0,
+                        resource: buffer.as_entire_binding(),
+                    }],
+                });
+                let view = self.maps.create_view(&wgpu::TextureViewDescriptor {
+                    dimension: Some(wgpu::TextureViewDimension::D2),
+                    base_array_layer: layer as u32,
+                    array_layer_count: Some(1),
+                    ..Default::default()
+                });
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("subsurface_lab::renderer shadow"),
+                    depth_stencil_attachment: Some(super::depth_attachment(
+                        &view,
+                        wgpu::LoadOp::Clear(1.0),
+                    )),
+                    ..Default::default()
+                });
+                pass.set_pipeline(&self.pipeline);
+                pass.set_bind_group(0, &group, &[]);
+                for mesh in meshes {
+                    mesh.draw(&mut pass, 0..mesh.index_count);
+                }
+            }
+        });
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wgsl::assert_layout;
+
+    #[test]
+    fn lights_lie_as_the_shader_has_them() {
+        let shader = include_str!("lighting.wgsl");
+        assert_layout!(
+            shader,
+            "Light",
+            LightUniform {
+                direction,
+                tan_radius,
+                color,
+                pad,
+                to_map
+            }
+        );
+        assert_layout!(
+            shader,
+            "Lighting",
+            LightingUniform {
+                lights,
+                sky,
+                map_extent,
+                count,
+                specular_model,
+                specular_intensity,
+                f0,
+                slope
+            }
+        );
+    }
+
+    #[test]
+    fn a_uniform_sky_lights_every_side_alike() {
+        let sky = Sky::project(|_| Vec3::ONE);
+        // π of irradiance over π; 4096 samples of a constant leave rounding only.
+        for n in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE.normalize()] {
+            let e: Vec3 = sky.0.iter().zip(basis(n)).map(|(c, b)| *c * b).sum();
+            assert!((e - Vec3::ONE).abs().max_element() < 2e-3, "{n}: {e}");
+        }
+    }
+
+    #[test]
+    fn a_half_sky_lights_the_horizon_by_half() {
+        let sky = Sky::project(|d| Vec3::splat(if d.y > 0.0 { 1.0 } else { 0.0 }));
+        let e = |n: Vec3| -> f32 { sky.0.iter().zip(basis(n)).map(|(c, b)| c.x * b).sum() };
+        // (1 + n·y)/2 lies wholly in the first two bands.
+        for n in [Vec3::X, Vec3::Y, Vec3::NEG_Y, Vec3::new(0.6, 0.8, 0.0)] {
+            assert!((e(n) - (1.0 + n.y) / 2.0).abs() < 2e-3, "{n}: {}", e(n));
+        }
+    }
+}

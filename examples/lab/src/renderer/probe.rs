@@ -1,0 +1,248 @@
+//! What a reference needs to know of a scene beyond its G-buffer: the surface that each pixel
+//! shows, and the light on any place of a surface, seen or not. Driver of
+//! `probe.wgsl`.
+
+use glam::{Vec2, Vec3, Vec4};
+use wgpu::TextureFormat;
+
+use super::mesh::Mesh;
+use super::{Camera, Gpu, Pipeline, Primitive, Renderer};
+
+/// Places are lit so many at a time, in a square texture.
+const SIDE: u32 = 1024;
+/// Numbers of a place, in fours.
+const LAYERS: u32 = 5;
+
+/// Asks a renderer for points and light.
+pub struct Probe {
+    visible: wgpu::RenderPipeline,
+    irradiance: wgpu::RenderPipeline,
+    places: wgpu::Texture,
+    group: wgpu::BindGroup,
+    lit: wgpu::TextureView,
+}
+
+impl Probe {
+    /// The passes for what `renderer` draws.
+    pub fn new(gpu: &Gpu, renderer: &Renderer) -> Self {
+        let label = "subsurface_lab::renderer probe";
+        let shader = gpu
+            .device
+            .create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(label),
+                source: wgpu::ShaderSource::Wgsl(
+                    [
+                        include_str!("material.wgsl"),
+                        include_str!("lighting.wgsl"),
+                        include_str!("probe.wgsl"),
+                    ]
+                    .concat()
+                    .into(),
+                ),
+            });
+        let layout = gpu
+            .device
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(label),
+                entries: &[wgpu::BindGroupLayoutEntry {
+                    binding: 0,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Texture {
+                        sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                        view_dimension: wgpu::TextureViewDimension::D2Array,
+                        multisampled: false,
+                    },
+                    count: None,
+                }],
+            });
+        let places = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some(label),
+            size: wgpu::Extent3d {
+                width: SIDE,
+                height: SIDE,
+                depth_or_array_layers: LAYERS,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: TextureFormat::Rgba32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(label),
+            layout: &layout,
+            entries: &[wgpu::BindGroupEntry {
+                binding: 0,
+                resource: wgpu::BindingResource::TextureView(&places.create_view(
+                    &wgpu::TextureViewDescriptor {
+                        dimension: Some(wgpu::TextureViewDimension::D2Array),
+                        ..Default::default()
+                    },
+                )),
+            }],
+        });
+        let visible = super::pipeline(
+            gpu,
+            Pipeline {
+                label,
+                shader: &shader,
+                vertex: "vs_screen",
+                fragment: "fs_visible",
+                groups: &[
+                    Some(&renderer.camera_layout),
+                    Some(&renderer.material_layout),
+                ],
+                targets: &[TextureFormat::Rgba32Float],
+                buffers: &[Mesh::VERTEX_LAYOUT],
+                depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Equal, false)),
+            },
+        );
+        let irradiance = super::pipeline(
+            gpu,
+            Pipeline {
+                label,
+                shader: &shader,
+                vertex: "vs_probe",
+                fragment: "fs_irradiance",
+                groups: &[
+                    Some(&renderer.camera_layout),
+                    Some(&renderer.material_layout),
+                    Some(&renderer.lights.layout),
+                    Some(&layout),
+                ],
+                targets: &[TextureFormat::Rgba32Float],
+                buffers: &[],
+                depth_stencil: None,
+            },
+        );
+        Self {
+            visible,
+            irradiance,
+            places,
+            group,
+            lit: gpu.target(label, [SIDE, SIDE], TextureFormat::Rgba32Float),
+        }
+    }
+
+    /// World position in mm and area in mm² of what each pixel shows, as `renderer` last drew it;
+    /// zeros where nothing is.
+    pub fn visible(&self, gpu: &Gpu, renderer: &Renderer) -> Vec<[f32; 4]> {
+        let label = "subsurface_lab::renderer visible";
+        let target = gpu.target(label, renderer.size, TextureFormat::Rgba32Float);
+        gpu.run(|encoder| {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some(label),
+                color_attachments: &[Some(super::color_attachment(
+                    &target,
+                    wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                ))],
+                depth_stencil_attachment: Some(super::depth_attachment(
+                    &renderer.gbuffer.depth,
+                    wgpu::LoadOp::Load,
+                )),
+                ..Default::default()
+            });
+            pass.set_pipeline(&self.visible);
+            pass.set_bind_group(0, &renderer.camera_group, &[]);
+            for mesh in &renderer.meshes {
+                pass.set_bind_group(1, &mesh.material, &[]);
+                mesh.draw(&mut pass, 0..mesh.index_count);
+            }
+        });
+        gpu.read(&target)
+    }
+
+    /// Irradiance/π at places of the scene's `primitive`, by the lights as `renderer` last drew them.
+    /// A place is the number of a triangle and the shares of its corners. Detail is filtered as in a
+    /// picture that `camera` takes; alpha is not looked at, and the outside alone is lit.
+    pub fn irradiance(
+        &self,
+        gpu: &Gpu,
+        renderer: &Renderer,
+        camera: &Camera,
+        (index, primitive): (usize, &Primitive),
+        mm_per_unit: f32,
+        places: &[(usize, Vec3)],
+    ) -> Vec<Vec3> {
+        let mut irradiance = Vec::with_capacity(places.len());
+        for places in places.chunks((SIDE * SIDE) as usize) {
+            let rows = (places.len() as u32).div_ceil(SIDE);
+            let mut layers = vec![Vec4::ZERO; (LAYERS * rows * SIDE) as usize];
+            for (i, place) in places.iter().enumerate() {
+                let texels = texels(primitive, *place, camera, renderer.size, mm_per_unit);
+                for (layer, texel) in texels.into_iter().enumerate() {
+                    layers[layer * (rows * SIDE) as usize + i] = texel;
+                }
+            }
+            gpu.queue.write_texture(
+                self.places.as_image_copy(),
+                bytemuck::cast_slice(&layers),
+                wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(SIDE * 16),
+                    rows_per_image: Some(rows),
+                },
+                wgpu::Extent3d {
+                    width: SIDE,
+                    height: rows,
+                    depth_or_array_layers: LAYERS,
+                },
+            );
+            gpu.run(|encoder| {
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("subsurface_lab::renderer probe"),
+                    color_attachments: &[Some(super::color_attachment(
+                        &self.lit,
+                        wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    ))],
+                    ..Default::default()
+                });
+                pass.set_scissor_rect(0, 0, SIDE, rows);
+                pass.set_pipeline(&self.irradiance);
+                pass.set_bind_group(0, &renderer.camera_group, &[]);
+                pass.set_bind_group(1, &renderer.meshes[index].material, &[]);
+                pass.set_bind_group(2, &renderer.lights.group, &[]);
+                pass.set_bind_group(3, &self.group, &[]);
+                pass.draw(0..3, 0..1);
+            });
+            let lit = gpu.read(&self.lit);
+            irradiance.extend(
+                lit[..places.len()]
+                    .iter()
+                    .map(|e| Vec3::new(e[0], e[1], e[2])),
+            );
+        }
+        irradiance
+    }
+}
+
+/// What the shader reads of a place.
+fn texels(
+    primitive: &Primitive,
+    (triangle, shares): (usize, Vec3),
+    camera: &Camera,
+    size: [u32; 2],
+    mm_per_unit: f32,
+) -> [Vec4; LAYERS as usize] {
+    let corner = |i: usize| &primitive.vertices[primitive.indices[3 * triangle + i] as usize];
+    let [a, b, c] = [corner(0), corner(1), corner(2)];
+    let position = |i: usize| Vec3::from(corner(i).position);
+    let between =
+        |of: fn(&super::Vertex) -> Vec4| shares.x * of(a) + shares.y * of(b) + shares.z * of(c);
+    let world = between(|v| Vec3::from(v.position).extend(0.0)).truncate();
+    let normal = between(|v| Vec3::from(v.normal).extend(0.0)).truncate();
+    // As a picture has it: by the triangle's own plane.
+    let plane = (position(1) - position(0)).cross(position(2) - position(0));
+    let [x, y] = camera.footprint(size, world, plane.normalize_or(Vec3::Z));
+    let uv = |v: &super::Vertex| Vec2::from(v.uv);
+    let uv_area = (uv(b) - uv(a)).perp_dot(uv(c) - uv(a)).abs();
+    let uv_per_unit = (uv_area / plane.length().max(f32::MIN_POSITIVE)).sqrt();
+    [
+        world.extend((x * y).sqrt() * mm_per_unit),
+        normal.extend(x.max(y) * uv_per_unit),
+        between(|v| v.tangent.into()),
+        between(|v| Vec2::from(v.uv).extend(0.0).extend(0.0)),
+        between(|v| v.mask.into()),
+    ]
+}

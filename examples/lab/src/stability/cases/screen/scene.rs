@@ -1,0 +1,207 @@
+//! Surfaces that a camera looks at and that have UVs.
+
+use std::f64::consts::TAU;
+
+use glam::{DVec2, DVec3};
+
+use crate::stability::unwrapped::{Texel, Unwrapped};
+use crate::synthetic::{GBuffer, Hit, View};
+
+/// Polar angle at which a sphere's island ends: what scatters to its visible half lies before it.
+const SPHERE_ENDS: f64 = 2.5;
+
+pub enum Form {
+    /// With its UVs along these, which are at right angles.
+    Plane {
+        along: DVec3,
+        down: DVec3,
+        side_mm: f64,
+    },
+    /// Endless; unrolled from its far side, `length_mm` of it.
+    Cylinder {
+        along: DVec3,
+        rho_mm: f64,
+        length_mm: f64,
+    },
+    /// Unrolled by the polar angle from its near side.
+    Sphere { rho_mm: f64 },
+}
+
+/// Light by the point, from the middle of the surface, and the normal; `None` is a hole.
+pub type Light = Box<dyn Fn(DVec3, DVec3) -> Option<DVec3>>;
+
+pub struct Surface {
+    pub form: Form,
+    pub middle_mm: DVec3,
+    pub light: Light,
+}
+
+/// Surfaces that hide each other, side by side in an atlas.
+pub struct Scene(pub Vec<Surface>);
+
+impl Form {
+    /// A plane that faces the camera.
+    pub fn facing(side_mm: f64) -> Self {
+        Self::Plane {
+            along: DVec3::X,
+            down: DVec3::NEG_Y,
+            side_mm,
+        }
+    }
+
+    /// Where a ray meets it first, from its middle, and the normal there.
+    fn meet(&self, origin: DVec3, ray: DVec3) -> Option<(DVec3, DVec3)> {
+        match *self {
+            Self::Plane { along, down, .. } => {
+                let normal = down.cross(along);
+                let point = origin - ray * (origin.dot(normal) / ray.dot(normal));
+                Some((point, normal))
+            }
+            Self::Cylinder { along, rho_mm, .. } => {
+                let (o, d) = (origin.reject_from(along), ray.reject_from(along));
+                let point = origin + ray * enters(o, d, rho_mm)?;
+                Some((point, point.reject_from(along) / rho_mm))
+            }
+            Self::Sphere { rho_mm } => {
+                let point = origin + ray * enters(origin, ray, rho_mm)?;
+                Some((point, point / rho_mm))
+            }
+        }
+    }
+
+    /// The point at UVs from 0 to 1, the normal there, and the area of a unit of UV.
+    fn at(&self, uv: DVec2) -> Option<(DVec3, DVec3, f64)> {
+        let centred = uv - 0.5;
+        match *self {
+            Self::Plane {
+                along,
+                down,
+                side_mm,
+            } => {
+                let point = (along * centred.x + down * centred.y) * side_mm;
+                Some((point, down.cross(along), side_mm * side_mm))
+            }
+            Self::Cylinder {
+                along,
+                rho_mm,
+                length_mm,
+            } => {
+                let (sin, cos) = (TAU * centred.x).sin_cos();
+                let normal = along.cross(DVec3::Z) * sin + DVec3::Z * cos;
+                let point = rho_mm * normal + along * (length_mm * centred.y);
+                Some((point, normal, TAU * rho_mm * length_mm))
+            }
+            Self::Sphere { rho_mm } => {
+                let theta = 2.0 * SPHERE_ENDS * centred.length();
+                let around = centred.normalize_or(DVec2::X);
+                let (sin, cos) = theta.sin_cos();
+                let normal = (around * sin).extend(cos);
+                let stretch = if theta > 0.0 { sin / theta } else { 1.0 };
+                let area_mm2 = (2.0 * SPHERE_ENDS * rho_mm).powi(2) * stretch;
+                (theta < SPHERE_ENDS).then_some((rho_mm * normal, normal, area_mm2))
+            }
+        }
+    }
+
+    /// The way back.
+    fn uv(&self, point: DVec3) -> DVec2 {
+        let centred = match *self {
+            Self::Plane {
+                along,
+                down,
+                side_mm,
+            } => DVec2::new(point.dot(along), point.dot(down)) / side_mm,
+            Self::Cylinder {
+                along, length_mm, ..
+            } => {
+                let angle = point.dot(along.cross(DVec3::Z)).atan2(point.z);
+                DVec2::new(angle / TAU, point.dot(along) / length_mm)
+            }
+            Self::Sphere { rho_mm } => {
+                let theta = (point.z / rho_mm).clamp(-1.0, 1.0).acos();
+                point.truncate().normalize_or(DVec2::X) * theta / (2.0 * SPHERE_ENDS)
+            }
+        };
+        centred + 0.5
+    }
+}
+
+/// How far along a ray, in its own lengths, a ball around the origin begins.
+fn enters(origin: DVec3, ray: DVec3, rho_mm: f64) -> Option<f64> {
+    let (a, b) = (ray.length_squared(), origin.dot(ray));
+    let root = b * b - a * (origin.length_squared() - rho_mm * rho_mm);
+    (root >= 0.0).then(|| (-b - root.sqrt()) / a)
+}
+
+impl Surface {
+    /// At a distance of 300 mm, with no holes.
+    pub fn new(form: Form, light: impl Fn(DVec3, DVec3) -> DVec3 + 'static) -> Self {
+        Self {
+            form,
+            middle_mm: DVec3::new(0.0, 0.0, -300.0),
+            light: Box::new(move |point, normal| Some(light(point, normal))),
+        }
+    }
+
+    pub fn moved(mut self, by_mm: DVec3) -> Self {
+        self.middle_mm += by_mm;
+        self
+    }
+
+    fn hit(&self, origin: DVec3, ray: DVec3) -> Option<Hit> {
+        let (point, normal) = self.form.meet(origin - self.middle_mm, ray)?;
+        Some(Hit {
+            irradiance: (self.light)(point, normal)?,
+            point: point + self.middle_mm,
+            normal,
+            id: 1,
+        })
+    }
+}
+
+impl Scene {
+    /// The surface that is seen along a ray, and what of it.
+    pub fn hit(&self, origin: DVec3, ray: DVec3) -> Option<(usize, Hit)> {
+        let hits = self.0.iter().enumerate();
+        hits.filter_map(|(i, s)| s.hit(origin, ray).map(|hit| (i, hit)))
+            .max_by(|(_, a), (_, b)| a.point.z.total_cmp(&b.point.z))
+    }
+
+    pub fn shoot(&self, view: &View) -> GBuffer {
+        view.shoot(|origin, ray| self.hit(origin, ray).map(|(_, hit)| hit))
+    }
+
+    /// Islands of `texels` each in a row.
+    pub fn unwrap(&self, texels: [u32; 2]) -> Unwrapped {
+        let count = self.0.len();
+        let [width, height] = texels;
+        let texel_uv2 = 1.0 / f64::from(width * height);
+        Unwrapped::new([width * count as u32, height], |uv| {
+            let along = uv.x * count as f64;
+            let surface = &self.0[along as usize];
+            let (point, normal, area_mm2) = surface.form.at(DVec2::new(along.fract(), uv.y))?;
+            Some(Texel {
+                point_mm: point + surface.middle_mm,
+                irradiance: (surface.light)(point, normal)?,
+                area_mm2: area_mm2 * texel_uv2,
+            })
+        })
+    }
+
+    /// Where in the atlas a point of a surface lies.
+    pub fn uv(&self, surface: usize, point: DVec3) -> DVec2 {
+        let at = self.0[surface].form.uv(point - self.0[surface].middle_mm);
+        DVec2::new((surface as f64 + at.x) / self.0.len() as f64, at.y)
+    }
+}
+
+/// Light from a direction.
+pub fn lambert(direction: DVec3) -> impl Fn(DVec3, DVec3) -> DVec3 {
+    move |_, normal| DVec3::splat(normal.dot(direction).max(0.0))
+}
+
+/// A direction `degrees` from the camera's, towards `side` in the picture.
+pub fn from_camera(degrees: f64, side: DVec3) -> DVec3 {
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    side * sin + DVec3::Z * cos
+}

@@ -1,0 +1,561 @@
+//! The scene on a device of its own and on a thread of its own: draws, scatters, takes the time and
+//! measures. A software driver works for seconds, and does a device's work in order; on the window's
+//! device and thread, the window would wait for it.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+use std::sync::mpsc::Receiver;
+use std::time::Instant;
+
+use image::RgbImage;
+use subsurface::wgpu::TextureView;
+use subsurface::{Atlas, Frame, Plan, Profile, ScreenSpace, TextureSpace, View};
+use subsurface_lab::Error;
+use subsurface_lab::metrics;
+use subsurface_lab::renderer::{
+    AtlasRenderer, Camera, Gpu, Layer as Shown, Lighting, Renderer, Scene,
+};
+
+use crate::layer::Layer;
+use crate::legend::Legend;
+use crate::passes::{Pass, Submission};
+use crate::{level, passes, width};
+
+/// While the view moves, effects that took longer wait until it rests.
+const PATIENCE_MS: f64 = 400.0;
+
+/// What a frame depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    pub size: [u32; 2],
+    pub camera: Camera,
+    pub lighting: Lighting,
+    pub profile: Profile,
+    /// None: the first is still being fitted. It may be of another profile, while the next is.
+    pub plan: Option<Arc<Plan>>,
+    /// What is shown, from left to right.
+    pub layers: Vec<Layer>,
+    /// A drag goes on.
+    pub is_moving: bool,
+}
+
+/// A frame that is asked for.
+pub struct Request {
+    /// Counts them.
+    pub number: u64,
+    pub look: Look,
+    /// Errors against the exact effect, too.
+    pub measure: bool,
+    /// The time of each pass of what is shown, too.
+    pub time_passes: bool,
+}
+
+/// One layer, drawn.
+pub struct Picture {
+    /// What is seen, in words; where it is not what was asked for, why.
+    pub title: String,
+    pub image: RgbImage,
+    /// Of false colours.
+    pub legend: Option<Legend>,
+}
+
+/// What an effect took.
+#[derive(Clone, Copy, Debug)]
+pub struct Time {
+    pub layer: Layer,
+    /// Wall clock, from preparing to the end of the wait.
+    pub ms: f64,
+    /// Shaders were compiled and textures made within it.
+    pub is_first: bool,
+}
+
+/// What the passes of an effect took.
+#[derive(Clone, Debug)]
+pub struct PassTimes {
+    pub passes: Vec<Pass>,
+    /// How much of each is the submission itself.
+    pub empty_ms: f64,
+}
+
+/// The answer to a request.
+pub struct Frame {
+    /// That of its request.
+    pub number: u64,
+    pub look: Look,
+    pub pictures: Vec<Arc<Picture>>,
+    /// Drawing and lighting, wall clock.
+    pub draw_ms: f64,
+    /// Making a picture of scattered light and reading it back, wall clock.
+    pub compose_ms: Option<f64>,
+    /// Of the effects that this view has been scattered by.
+    pub times: Vec<Time>,
+    /// Of those whose passes were timed for this view.
+    pub passes: Vec<(Layer, PassTimes)>,
+    /// Relative RMSE against the exact effect, where it was measured for this view.
+    pub errors: Vec<(Layer, Option<f64>)>,
+}
+
+/// What stays the same.
+pub struct Stage {
+    pub gpu: Gpu,
+    pub scene: Scene,
+    pub mm_per_unit: f32,
+    /// Side of the atlas, in texels.
+    pub texture_size: u32,
+}
+
+impl Stage {
+    /// Answers requests until there are no more: the newest, and none that is older.
+    pub fn run(self, requests: Receiver<Request>, answer: impl Fn(Result<Frame, Error>)) {
+        let mut set = None;
+        let mut effects = Effects::default();
+        while let Ok(mut request) = requests.recv() {
+            while let Ok(newer) = requests.try_recv() {
+                request = Request {
+                    measure: request.measure || newer.measure,
+                    time_passes: request.time_passes || newer.time_passes,
+                    ..newer
+                };
+            }
+            answer(self.frame(&mut set, &mut effects, request));
+        }
+    }
+
+    fn frame(
+        &self,
+        kept: &mut Option<Set>,
+        effects: &mut Effects,
+        request: Request,
+    ) -> Result<Frame, Error> {
+        // Textures of another size go before those of this one come.
+        kept.take_if(|set| set.size != request.look.size);
+        let mut set = match kept.take() {
+            Some(set) => set,
+            None => Set::new(self, &request.look)?,
+        };
+        set.draw(self, &request.look)?;
+        let mut pictures = Vec::new();
+        for layer in &request.look.layers {
+            pictures.push(set.picture(self, effects, &request.look, *layer)?);
+        }
+        if request.measure {
+            set.measure(self, effects, &request.look)?;
+        }
+        if request.time_passes {
+            set.time_passes(self, effects, &request.look)?;
+        }
+        let shots = &set.view.shots;
+        let frame = Frame {
+            pictures,
+            draw_ms: set.view.draw_ms,
+            compose_ms: set.view.compose_ms,
+            times: Layer::ALL
+                .iter()
+                .filter_map(|layer| shots.get(layer)?.time)
+                .collect(),
+            passes: Layer::ALL
+                .iter()
+                .filter_map(|layer| Some((*layer, shots.get(layer)?.passes.clone()?)))
+                .collect(),
+            errors: set.view.errors.clone(),
+            number: request.number,
+            look: request.look,
+        };
+        *kept = Some(set);
+        Ok(frame)
+    }
+}
+
+/// Made when they are first asked for, and kept over changes of size: a driver may compile for seconds.
+#[derive(Default)]
+struct Effects {
+    screen: Option<PlannedScreenSpace>,
+    exact: Option<ScreenSpace>,
+    texture: Option<TextureSpace>,
+    /// What each took last.
+    last_ms: HashMap<Layer, f64>,
+}
+
+/// All that is made for one size of picture.
+struct Set {
+    size: [u32; 2],
+    renderer: Renderer,
+    outputs: HashMap<Layer, TextureView>,
+    /// Made when it is first asked for.
+    atlas: Option<AtlasRenderer>,
+    view: View,
+}
+
+/// What is known of one view.
+struct View {
+    camera: Camera,
+    lighting: Lighting,
+    profile: Profile,
+    plan: Option<Arc<Plan>>,
+    draw_ms: f64,
+    compose_ms: Option<f64>,
+    shots: HashMap<Layer, Shot>,
+    errors: Vec<(Layer, Option<f64>)>,
+}
+
+#[derive(Clone)]
+struct Shot {
+    picture: Arc<Picture>,
+    /// Scattered, or as it fell; none behind false colours.
+    irradiance: Option<TextureView>,
+    time: Option<Time>,
+    passes: Option<PassTimes>,
+}
+
+/// What an effect leaves.
+struct Scattered {
+    title: String,
+    irradiance: TextureView,
+    /// None where nothing was to be done.
+    taken_ms: Option<f64>,
+}
+
+impl View {
+    fn new(stage: &Stage, renderer: &Renderer, look: &Look) -> Result<Self, Error> {
+        let since = Instant::now();
+        let (camera, lighting) = (look.camera, look.lighting.clone());
+        renderer.render(&stage.gpu, &camera, &lighting, stage.mm_per_unit)?;
+        Ok(Self {
+            camera,
+            lighting,
+            profile: look.profile,
+            plan: look.plan.clone(),
+            draw_ms: ms(since),
+            compose_ms: None,
+            shots: HashMap::new(),
+            errors: Vec::new(),
+        })
+    }
+}
+
+impl Set {
+    fn new(stage: &Stage, look: &Look) -> Result<Self, Error> {
+        let renderer = Renderer::new(&stage.gpu, &stage.scene, look.size)?;
+        Ok(Self {
+            size: look.size,
+            view: View::new(stage, &renderer, look)?,
+            renderer,
+            outputs: HashMap::new(),
+            atlas: None,
+        })
+    }
+
+    /// Draws what is asked for unless that is there, and forgets what is of something else.
+    fn draw(&mut self, stage: &Stage, look: &Look) -> Result<(), Error> {
+        let view = &mut self.view;
+        if view.camera != look.camera || view.lighting != look.lighting {
+            *view = View::new(stage, &self.renderer, look)?;
+        }
+        if view.profile != look.profile {
+            // The plan brings its own.
+            let stays = |l: &Layer| matches!(l, Layer::None | Layer::Screen | Layer::Level);
+            view.shots.retain(|layer, _| stays(layer));
+            view.errors.clear();
+            view.profile = look.profile;
+        }
+        if view.plan != look.plan {
+            let goes = |l: &Layer| matches!(l, Layer::Screen | Layer::Level);
+            view.shots.retain(|layer, _| !goes(layer));
+            view.errors.clear();
+            view.plan = look.plan.clone();
+        }
+        Ok(())
+    }
+
+    /// The layer or, where it cannot be had, the light as it fell and why.
+    fn picture(
+        &mut self,
+        stage: &Stage,
+        effects: &mut Effects,
+        look: &Look,
+        layer: Layer,
+    ) -> Result<Arc<Picture>, Error> {
+        let last_ms = effects.last_ms.get(&layer).copied().unwrap_or(0.0);
+        let is_known = self.view.shots.contains_key(&layer);
+        let is_planned = matches!(layer, Layer::Screen | Layer::Level);
+        let is_exact = look.plan.as_ref().is_some_and(|plan| plan.is_exact());
+        let why = if is_planned && look.plan.is_none() {
+            "the plan is being fitted".to_owned()
+        } else if layer == Layer::Level && is_exact {
+            "the plan is the exact effect, which has no levels".to_owned()
+        } else if look.is_moving && last_ms > PATIENCE_MS && !is_known {
+            format!("{} follows at rest", layer.title())
+        } else {
+            match self.shot(stage, effects, look, layer) {
+                Ok(shot) => return Ok(shot.picture),
+                // Some models cannot have it.
+                Err(error) if layer == Layer::Texture => error.to_string(),
+                Err(error) => return Err(error),
+            }
+        };
+        let plain = self.shot(stage, effects, look, Layer::None)?.picture;
+        Ok(Arc::new(Picture {
+            title: format!("{} ({why})", plain.title),
+            image: plain.image.clone(),
+            legend: None,
+        }))
+    }
+
+    fn shot(
+        &mut self,
+        stage: &Stage,
+        effects: &mut Effects,
+        look: &Look,
+        layer: Layer,
+    ) -> Result<Shot, Error> {
+        if let Some(shot) = self.view.shots.get(&layer) {
+            return Ok(shot.clone());
+        }
+        let shot = match layer {
+            Layer::Width | Layer::Level => self.false_colors(stage, look, layer)?,
+            _ => self.scatter(stage, effects, look, layer)?,
+        };
+        self.view.shots.insert(layer, shot.clone());
+        Ok(shot)
+    }
+
+    fn scatter(
+        &mut self,
+        stage: &Stage,
+        effects: &mut Effects,
+        look: &Look,
+        layer: Layer,
+    ) -> Result<Shot, Error> {
+        let at_once = &mut Submission::AtOnce;
+        let Scattered {
+            title,
+            irradiance,
+            taken_ms,
+        } = self.run_effect(stage, effects, look, layer, at_once)?;
+        let time = taken_ms.map(|ms| Time {
+            layer,
+            ms,
+            is_first: effects.last_ms.insert(layer, ms).is_none(),
+        });
+        let since = Instant::now();
+        let pixels = self
+            .renderer
+            .compose(&stage.gpu, &irradiance, Shown::Picture, 1.0);
+        self.view.compose_ms = Some(ms(since));
+        Ok(Shot {
+            picture: Arc::new(Picture {
+                title,
+                image: image(self.size, pixels)?,
+                legend: None,
+            }),
+            irradiance: Some(irradiance),
+            time,
+            passes: None,
+        })
+    }
+
+    /// Runs the effects that are shown once more, pass by pass.
+    fn time_passes(
+        &mut self,
+        stage: &Stage,
+        effects: &mut Effects,
+        look: &Look,
+    ) -> Result<(), Error> {
+        for layer in look.layers.iter().filter(|layer| layer.has_passes()) {
+            // None where it could not be had; and whoever was shown has compiled.
+            if !self.view.shots.contains_key(layer) {
+                continue;
+            }
+            let empty_ms = passes::empty_ms(&stage.gpu);
+            let mut by_pass = Submission::ByPass(Vec::new());
+            self.run_effect(stage, effects, look, *layer, &mut by_pass)?;
+            if let (Submission::ByPass(passes), Some(shot)) =
+                (by_pass, self.view.shots.get_mut(layer))
+            {
+                shot.passes = Some(PassTimes { passes, empty_ms });
+            }
+        }
+        Ok(())
+    }
+
+    fn run_effect(
+        &mut self,
+        stage: &Stage,
+        effects: &mut Effects,
+        look: &Look,
+        layer: Layer,
+        submission: &mut Submission,
+    ) -> Result<Scattered, Error> {
+        let (gpu, renderer) = (&stage.gpu, &self.renderer);
+        let fallen = &renderer.gbuffer.irradiance;
+        let output = match layer {
+            Layer::None => fallen,
+            _ => self
+                .outputs
+                .entry(layer)
+                .or_insert_with(|| renderer.scattered_target(gpu)),
+        };
+        let profiles = [look.profile];
+        let frame = ScreenFrame {
+            irradiance: fallen,
+            depth: &renderer.gbuffer.depth,
+            profile_id: Some(&renderer.gbuffer.profile_id),
+            normal: None,
+            strength: None,
+            viewport: None,
+            output,
+            projection: look.camera.projection(self.size),
+            mm_per_unit: stage.mm_per_unit,
+            profiles: &profiles,
+        };
+        let format = output.texture().format();
+        let mut title = layer.title().to_owned();
+        let taken_ms = match layer {
+            Layer::None | Layer::Width | Layer::Level => None,
+            Layer::Screen => match &look.plan {
+                None => None,
+                Some(plan) => {
+                    title = match plan.is_exact() {
+                        true => format!("{title}: exact"),
+                        false => format!("{title} at {:.4}", plan.max_error()),
+                    };
+                    let since = Instant::now();
+                    let frame = ScreenFrame {
+                        profiles: plan.profiles(),
+                        ..frame
+                    };
+                    let effect = made(&mut effects.screen, || {
+                        PlannedScreenSpace::new(&gpu.device, format)
+                    })?;
+                    effect.prepare(&gpu.device, &gpu.queue, &frame, plan)?;
+                    submission.run(gpu, |encoder, after| effect.render_by_pass(encoder, after));
+                    Some(ms(since))
+                }
+            },
+            Layer::Exact => {
+                let since = Instant::now();
+                let effect = made(&mut effects.exact, || ScreenSpace::new(&gpu.device, format))?;
+                effect.prepare(&gpu.device, &frame)?;
+                submission.run(gpu, |encoder, after| effect.render_by_pass(encoder, after));
+                Some(ms(since))
+            }
+            Layer::Texture => {
+                title = format!("{title}, {0}×{0}", stage.texture_size);
+                let since = Instant::now();
+                let effect = made(&mut effects.texture, || {
+                    TextureSpace::new(&gpu.device, format)
+                })?;
+                let atlas = made(&mut self.atlas, || {
+                    AtlasRenderer::new(gpu, renderer, stage.texture_size)
+                })?;
+                let scatter = |atlas: &Atlas| {
+                    effect.prepare(&gpu.device, atlas)?;
+                    submission.run(gpu, |encoder, after| effect.render_by_pass(encoder, after));
+                    Ok(())
+                };
+                atlas.render(gpu, renderer, &profiles, stage.mm_per_unit, output, scatter)?;
+                Some(ms(since))
+            }
+        };
+        Ok(Scattered {
+            title,
+            irradiance: output.clone(),
+            taken_ms,
+        })
+    }
+
+    fn false_colors(&self, stage: &Stage, look: &Look, layer: Layer) -> Result<Shot, Error> {
+        let depth = &self.renderer.gbuffer.depth;
+        let depth: Vec<f32> = bytemuck::pod_collect_to_vec(&stage.gpu.read_bytes(depth.texture()));
+        let skin = self.skin(stage);
+        let in_pixels = |length_mm| {
+            let (camera, unit) = (&look.camera, stage.mm_per_unit);
+            width::in_pixels(length_mm, &depth, &skin, camera, self.size, unit)
+        };
+        let mut title = layer.title().to_owned();
+        let (pixels, legend) = match (layer, &look.plan) {
+            (Layer::Level, Some(plan)) => {
+                title = format!("{title} at {:.4}", plan.max_error());
+                let rows = level::rows(plan, &in_pixels(1.0), self.size[0]);
+                let (pixels, keys) = level::picture(plan, &rows);
+                (pixels, Some(Legend::Levels(keys)))
+            }
+            _ => {
+                let widths = in_pixels(width::widest_mm(&look.profile));
+                let range = width::range(&widths);
+                (width::picture(&widths, range), range.map(Legend::Width))
+            }
+        };
+        Ok(Shot {
+            picture: Arc::new(Picture {
+                title,
+                image: image(self.size, pixels)?,
+                legend,
+            }),
+            irradiance: None,
+            time: None,
+            passes: None,
+        })
+    }
+
+    /// Holds what is cheap, and what is there, to the exact effect.
+    fn measure(&mut self, stage: &Stage, effects: &mut Effects, look: &Look) -> Result<(), Error> {
+        let mut layers = vec![Layer::None];
+        if self.view.shots.contains_key(&Layer::Texture) {
+            layers.push(Layer::Texture);
+        }
+        // While a plan is on its way, the old one may be of another profile.
+        let plan = look.plan.as_ref();
+        if plan.is_some_and(|plan| plan.profiles() == [look.profile]) {
+            layers.push(Layer::Screen);
+        }
+        // Whoever asks for figures wants no first run among the times.
+        let is_first = |shot: &Shot| shot.time.is_some_and(|time| time.is_first);
+        self.view.shots.retain(|_, shot| !is_first(shot));
+
+        let [width, height] = self.size;
+        let skin = metrics::erode(&self.skin(stage), width, height, 2);
+        let mut light = |layer| -> Result<metrics::Layer, Error> {
+            let shot = self.shot(stage, effects, look, layer)?;
+            let pixels = shot.irradiance.iter().flat_map(|v| stage.gpu.read(v));
+            Ok(metrics::Layer {
+                width,
+                height,
+                pixels: pixels.map(|[r, g, b, _]| [r, g, b]).collect(),
+            })
+        };
+        let exact = light(Layer::Exact)?;
+        let mut errors = Vec::new();
+        for layer in layers {
+            let error = metrics::relative_rmse(&light(layer)?, &exact, &skin);
+            errors.push((layer, error));
+        }
+        self.view.errors = errors;
+        Ok(())
+    }
+
+    /// What scatters: the first profile, as there is no other.
+    fn skin(&self, stage: &Stage) -> Vec<bool> {
+        let ids = self.renderer.gbuffer.profile_id.texture();
+        let ids = stage.gpu.read_bytes(ids);
+        ids.into_iter().map(|id| id == 1).collect()
+    }
+}
+
+fn made<T>(kept: &mut Option<T>, make: impl FnOnce() -> Result<T, Error>) -> Result<&mut T, Error> {
+    let value = match kept.take() {
+        Some(value) => value,
+        None => make()?,
+    };
+    Ok(kept.insert(value))
+}
+
+fn ms(since: Instant) -> f64 {
+    since.elapsed().as_secs_f64() * 1e3
+}
+
+fn image(size: [u32; 2], pixels: Vec<[u8; 3]>) -> Result<RgbImage, Error> {
+    let count = pixels.len();
+    RgbImage::from_raw(size[0], size[1], pixels.into_flattened())
+        .ok_or_else(|| Error::new("picture", format!("{count} pixels"), "one of its size"))
+}

@@ -1,0 +1,309 @@
+//! The sum of Gaussians over a surface that is given by a position per pixel: what the exact effect and
+//! texture space share. Drives `shaders/exact/gaussian_sum.wgsl`.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{UVec2, Vec4};
+use wgpu::{
+    BindGroup, BindGroupLayout, BindingResource, Buffer, ColorTargetState, ColorWrites, Device,
+    PrimitiveTopology, Queue, RenderPipeline, ShaderStages, TextureFormat, TextureView,
+};
+
+use crate::frame::Viewport;
+use crate::gpu::{self, Recorder};
+use crate::{MAX_PROFILES, Output, Profile};
+
+/// Per pixel: E·A and A, Σ over a row, and the running sum. Full floats: twelve roundings to half
+/// floats would lose energy.
+pub(crate) const SCRATCH: TextureFormat = TextureFormat::Rgba32Float;
+
+pub(crate) const SHADER: &str = include_str!("../../shaders/exact/gaussian_sum.wgsl");
+
+/// Bindings of the shader.
+const SETTINGS: u32 = 0;
+const POSITIONS: u32 = 1;
+const IRRADIANCE: u32 = 2;
+const SOURCE: u32 = 3;
+const ROWS: u32 = 4;
+const SUM: u32 = 5;
+const STRENGTH: u32 = 6;
+const ALBEDO: u32 = 7;
+
+/// `Settings` of the shader.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(crate) struct Settings {
+    pub gaussians: [Vec4; MAX_PROFILES * Profile::MAX_GAUSSIANS],
+    /// See the shader; zero where the surface itself tells.
+    pub spacing: Vec4,
+    pub mm_per_unit: f32,
+    /// In pixels.
+    pub gutter: i32,
+    pub profiles: u32,
+    pub has_strength: u32,
+    pub has_albedo: u32,
+    pub pad: u32,
+    /// Of the irradiance, the output and the strength.
+    pub first_pixel: UVec2,
+}
+
+impl Settings {
+    pub fn new(profiles: &[Profile], mm_per_unit: f32) -> Self {
+        let mut settings = Self {
+            mm_per_unit,
+            profiles: profiles.len() as u32,
+            ..Self::zeroed()
+        };
+        let slots = settings.gaussians.chunks_exact_mut(Profile::MAX_GAUSSIANS);
+        for (slots, profile) in slots.zip(profiles) {
+            for (slot, g) in slots.iter_mut().zip(profile.gaussians()) {
+                let [r, gr, b] = g.weight;
+                *slot = Vec4::new(r, gr, b, g.variance_mm2);
+            }
+        }
+        settings
+    }
+}
+
+/// The passes, for any number of surfaces.
+#[derive(Debug)]
+pub(crate) struct GaussianSum {
+    label: &'static str,
+    output: Output,
+    source: Pass,
+    rows: Pass,
+    sum: Pass,
+    resolve: Pass,
+}
+
+#[derive(Debug)]
+struct Pass {
+    /// Bindings of the textures that it reads.
+    textures: Vec<u32>,
+    layout: BindGroupLayout,
+    pipeline: RenderPipeline,
+}
+
+/// What one surface needs, and the groups of its last frame.
+#[derive(Debug)]
+pub(crate) struct Sums {
+    size: [u32; 2],
+    settings: Buffer,
+    source: TextureView,
+    rows: TextureView,
+    sums: [TextureView; 2],
+    groups: Option<Groups>,
+}
+
+#[derive(Debug)]
+struct Groups {
+    read: Textures,
+    source: BindGroup,
+    rows: BindGroup,
+    /// Reads the one sum, writes the other.
+    sums: [BindGroup; 2],
+    /// Of either sum.
+    resolve: [BindGroup; 2],
+    gaussians: u32,
+    viewport: Option<Viewport>,
+}
+
+/// The textures of one frame, already checked.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Textures {
+    pub positions: TextureView,
+    pub irradiance: TextureView,
+    /// The irradiance where there is none; it is not looked at then.
+    pub strength: TextureView,
+    pub albedo: TextureView,
+}
+
+impl GaussianSum {
+    pub fn new(device: &Device, output: Output, label: &'static str) -> Self {
+        let module = gpu::module(device, label, &[SHADER]);
+        let pass = |fragment: &str, textures: &[u32], target: ColorTargetState| {
+            let label = format!("{label} {fragment}");
+            let mut bindings = vec![(SETTINGS, gpu::UNIFORM)];
+            bindings.extend(textures.iter().map(|b| (*b, gpu::FLOATS)));
+            let layout = gpu::layout(device, &label, ShaderStages::FRAGMENT, &bindings);
+            let pipeline = gpu::Draw {
+                label: &label,
+                module: &module,
+                vertex: "vs_main",
+                fragment,
+                layout: &layout,
+                topology: PrimitiveTopology::TriangleList,
+                targets: &[Some(target)],
+                constants: &[],
+            }
+            .pipeline(device);
+            Pass {
+                textures: textures.to_vec(),
+                layout,
+                pipeline,
+            }
+        };
+        let resolve = match output {
+            Output::Scattered(_) => "fs_resolve",
+            Output::AddScattered(_) => "fs_add",
+            Output::AddDifference(_) => "fs_difference",
+        };
+        let sums = [POSITIONS, IRRADIANCE, SOURCE, ROWS, SUM];
+        Self {
+            label,
+            output,
+            source: pass("fs_source", &[POSITIONS, IRRADIANCE], SCRATCH.into()),
+            rows: pass("fs_rows", &[POSITIONS, SOURCE], SCRATCH.into()),
+            sum: pass("fs_sum", &sums, SCRATCH.into()),
+            resolve: pass(
+                resolve,
+                &[POSITIONS, IRRADIANCE, SUM, STRENGTH, ALBEDO],
+                output.target(ColorWrites::ALL),
+            ),
+        }
+    }
+
+    /// Scratch for a surface of this size.
+    pub fn sums(&self, device: &Device, size: [u32; 2]) -> Sums {
+        let label = self.label;
+        let view =
+            |name: &str| gpu::scratch_texture(device, &format!("{label} {name}"), size, SCRATCH);
+        Sums {
+            size,
+            settings: gpu::uniform_buffer::<Settings>(device, &format!("{label} settings")),
+            source: view("source"),
+            rows: view("rows"),
+            sums: [view("sum 0"), view("sum 1")],
+            groups: None,
+        }
+    }
+
+    /// Uploads the numbers of a frame, and binds its textures where they are others than before.
+    pub fn prepare(
+        &self,
+        device: &Device,
+        queue: &Queue,
+        sums: &mut Sums,
+        read: Textures,
+        settings: &Settings,
+        profiles: &[Profile],
+        viewport: Option<Viewport>,
+    ) {
+        queue.write_buffer(&sums.settings, 0, bytemuck::bytes_of(settings));
+        let gaussians = profiles.iter().map(|p| p.gaussians().len()).max();
+        let gaussians = gaussians.unwrap_or(0) as u32;
+        match &mut sums.groups {
+            Some(groups) if groups.read == read => {
+                groups.gaussians = gaussians;
+                groups.viewport = viewport;
+            }
+            _ => sums.groups = Some(self.bind(device, sums, read, gaussians, viewport)),
+        }
+    }
+
+    fn bind(
+        &self,
+        device: &Device,
+        sums: &Sums,
+        read: Textures,
+        gaussians: u32,
+        viewport: Option<Viewport>,
+    ) -> Groups {
+        let group = |pass: &Pass, sum: usize| {
+            let texture = |binding: &u32| {
+                let view = match *binding {
+                    POSITIONS => &read.positions,
+                    IRRADIANCE => &read.irradiance,
+                    SOURCE => &sums.source,
+                    ROWS => &sums.rows,
+                    STRENGTH => &read.strength,
+                    ALBEDO => &read.albedo,
+                    _ => &sums.sums[sum],
+                };
+                (*binding, BindingResource::TextureView(view))
+            };
+            let mut resources = vec![(SETTINGS, sums.settings.as_entire_binding())];
+            resources.extend(pass.textures.iter().map(texture));
+            gpu::group(device, self.label, &pass.layout, &resources)
+        };
+        Groups {
+            source: group(&self.source, 0),
+            rows: group(&self.rows, 0),
+            sums: [group(&self.sum, 0), group(&self.sum, 1)],
+            resolve: [group(&self.resolve, 0), group(&self.resolve, 1)],
+            read,
+            gaussians,
+            viewport,
+        }
+    }
+
+    /// Records the frame that was last prepared; nothing before the first.
+    pub fn render(&self, recorder: &mut Recorder, sums: &Sums, output: &TextureView) {
+        let Some(groups) = &sums.groups else { return };
+        let mut draw = |name: &str, pass: &Pass, group, to, instance: u32| {
+            let label = format!("{} {name}", self.label);
+            // Every pixel is written.
+            let mut recording = recorder.draw(&label, &[to], false);
+            recording.set_pipeline(&pass.pipeline);
+            recording.set_bind_group(0, group, &[]);
+            recording.draw(0..3, instance..instance + 1);
+        };
+        draw("source", &self.source, &groups.source, &sums.source, 0);
+        for i in 0..groups.gaussians {
+            let from = i as usize % 2;
+            let (group, to) = (&groups.sums[from], &sums.sums[1 - from]);
+            let along = |what| format!("Gaussian {} along {what}", i + 1);
+            draw(&along("rows"), &self.rows, &groups.rows, &sums.rows, i);
+            draw(&along("columns"), &self.sum, group, to, i);
+        }
+        let keeps = self.output.adds() || groups.viewport.is_some();
+        let mut pass = recorder.draw(&format!("{} resolve", self.label), &[output], keeps);
+        if let Some(viewport) = groups.viewport {
+            viewport.apply(&mut pass);
+        }
+        let last = groups.gaussians as usize % 2;
+        pass.set_pipeline(&self.resolve.pipeline);
+        pass.set_bind_group(0, &groups.resolve[last], &[]);
+        pass.draw(0..3, 0..1);
+    }
+}
+
+impl Sums {
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// The textures of the frame that was last prepared.
+    pub fn read(&self) -> Option<&Textures> {
+        self.groups.as_ref().map(|groups| &groups.read)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wgsl::assert_layout;
+
+    #[test]
+    fn constants_are_those_of_the_shader() {
+        let slots = crate::wgsl::constant(SHADER, "MAX_GAUSSIANS");
+        assert_eq!(slots as usize, Profile::MAX_GAUSSIANS);
+    }
+
+    #[test]
+    fn settings_lie_as_the_shader_has_them() {
+        assert_layout!(
+            SHADER,
+            "Settings",
+            Settings {
+                gaussians,
+                spacing,
+                mm_per_unit,
+                gutter,
+                profiles,
+                has_strength,
+                has_albedo,
+                first_pixel
+            }
+        );
+    }
+}

@@ -1,0 +1,182 @@
+//! The exact sum in screen space: from depth to positions, then each Gaussian by the distances between
+//! them. Drives `shaders/exact/positions.wgsl`.
+
+pub(crate) mod gaussian_sum;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{Mat4, UVec2, Vec2};
+use wgpu::{
+    BindGroup, BindGroupLayout, BindingResource, Buffer, Device, Queue, RenderPipeline,
+    ShaderStages, TextureFormat, TextureView,
+};
+
+use crate::gpu::{self, Recorder};
+use crate::optics::Optics;
+use crate::{Frame, Output, Profile};
+use gaussian_sum::{GaussianSum, SCRATCH, Sums, Textures};
+
+/// Bytes a pixel: positions, and what [`GaussianSum`] takes.
+pub(crate) const BYTES_PER_PIXEL: u64 = 80;
+
+const LABEL: &str = "subsurface::exact";
+const SHADER: &str = include_str!("../../shaders/exact/positions.wgsl");
+
+/// `Settings` of the shader.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Settings {
+    inverse_projection: Mat4,
+    first_pixel: UVec2,
+    size: Vec2,
+    far: f32,
+    has_id: u32,
+    pad: [u32; 2],
+}
+
+/// The passes.
+#[derive(Debug)]
+pub(crate) struct Exact {
+    layout: BindGroupLayout,
+    positions: RenderPipeline,
+    /// Bound where a frame has no ids.
+    no_id: TextureView,
+    sum: GaussianSum,
+}
+
+/// What one view needs.
+#[derive(Debug)]
+pub(crate) struct ExactView {
+    settings: Buffer,
+    positions: TextureView,
+    bound: Option<Bound>,
+    sums: Sums,
+}
+
+#[derive(Debug)]
+struct Bound {
+    depth: TextureView,
+    profile_id: TextureView,
+    group: BindGroup,
+}
+
+impl Exact {
+    pub fn new(device: &Device, output: Output) -> Self {
+        let label = "subsurface::exact positions";
+        let bindings = [(0, gpu::UNIFORM), (1, gpu::FLOATS), (2, gpu::UINTS)];
+        let layout = gpu::layout(device, label, ShaderStages::FRAGMENT, &bindings);
+        let positions = gpu::Draw {
+            label,
+            module: &gpu::module(device, label, &[SHADER]),
+            vertex: "vs_main",
+            fragment: "fs_positions",
+            layout: &layout,
+            topology: wgpu::PrimitiveTopology::TriangleList,
+            targets: &[Some(SCRATCH.into())],
+            constants: &[],
+        }
+        .pipeline(device);
+        Self {
+            layout,
+            positions,
+            no_id: gpu::scratch_texture(device, label, [1, 1], TextureFormat::R8Uint),
+            sum: GaussianSum::new(device, output, LABEL),
+        }
+    }
+
+    /// Uploads the numbers of a frame. Makes anew what a change of its size, or of its textures, asks for.
+    pub fn prepare(
+        &self,
+        device: &Device,
+        queue: &Queue,
+        view: &mut Option<ExactView>,
+        frame: &Frame,
+        optics: &Optics,
+        profiles: &[Profile],
+    ) {
+        let size = frame.rectangle().size();
+        if view.as_ref().is_some_and(|v| v.sums.size() != size) {
+            *view = None; // The old scratch goes before the new one comes.
+        }
+        let view = view.get_or_insert_with(|| ExactView {
+            settings: gpu::uniform_buffer::<Settings>(device, "subsurface::exact settings"),
+            positions: gpu::scratch_texture(device, "subsurface::exact positions", size, SCRATCH),
+            bound: None,
+            sums: self.sum.sums(device, size),
+        });
+        let settings = Settings {
+            inverse_projection: optics.inverse_projection,
+            first_pixel: frame.rectangle().first(),
+            size: UVec2::from(size).as_vec2(),
+            far: optics.far,
+            has_id: u32::from(frame.profile_id.is_some()),
+            pad: [0; 2],
+        };
+        queue.write_buffer(&view.settings, 0, bytemuck::bytes_of(&settings));
+        let profile_id = frame.profile_id.unwrap_or(&self.no_id);
+        let is_bound = view
+            .bound
+            .as_ref()
+            .is_some_and(|b| b.depth == *frame.depth && b.profile_id == *profile_id);
+        if !is_bound {
+            let resources = [
+                (0, view.settings.as_entire_binding()),
+                (1, BindingResource::TextureView(frame.depth)),
+                (2, BindingResource::TextureView(profile_id)),
+            ];
+            view.bound = Some(Bound {
+                depth: frame.depth.clone(),
+                profile_id: profile_id.clone(),
+                group: gpu::group(device, LABEL, &self.layout, &resources),
+            });
+        }
+        let read = Textures {
+            positions: view.positions.clone(),
+            irradiance: frame.irradiance.clone(),
+            strength: frame.strength.unwrap_or(frame.irradiance).clone(),
+            albedo: frame.albedo.unwrap_or(frame.irradiance).clone(),
+        };
+        let settings = gaussian_sum::Settings {
+            spacing: optics.spacing(),
+            first_pixel: frame.rectangle().first(),
+            has_strength: u32::from(frame.strength.is_some()),
+            has_albedo: u32::from(frame.albedo.is_some()),
+            ..gaussian_sum::Settings::new(profiles, 1.0)
+        };
+        let (sums, viewport) = (&mut view.sums, frame.viewport);
+        self.sum
+            .prepare(device, queue, sums, read, &settings, profiles, viewport);
+    }
+
+    /// Records the frame that was last prepared.
+    pub fn render(&self, recorder: &mut Recorder, view: &ExactView, output: &TextureView) {
+        let Some(bound) = &view.bound else { return };
+        let label = "subsurface::exact positions";
+        let mut pass = recorder.draw(label, &[&view.positions], false);
+        pass.set_pipeline(&self.positions);
+        pass.set_bind_group(0, &bound.group, &[]);
+        pass.draw(0..3, 0..1);
+        drop(pass);
+        self.sum.render(recorder, &view.sums, output);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wgsl::assert_layout;
+
+    #[test]
+    fn settings_lie_as_the_shader_has_them() {
+        assert_layout!(
+            SHADER,
+            "Settings",
+            Settings {
+                inverse_projection,
+                first_pixel,
+                size,
+                far,
+                has_id
+            }
+        );
+    }
+}

@@ -1,0 +1,97 @@
+//! From a projection to millimetres: where the pixels of a frame lie in view space.
+
+use glam::{DMat4, DVec3, Mat4, Vec4};
+
+use crate::{Error, Frame};
+
+/// Where a frame's pixels are, in mm.
+#[derive(Debug)]
+pub(crate) struct Optics {
+    /// Normalised device coordinates to view space.
+    pub inverse_projection: Mat4,
+    /// The depth at which there is no surface.
+    pub far: f32,
+    /// x and y over z of the surface at the corner of the viewport, then the part that is not over z.
+    pub origin: Vec4,
+    /// The same for a step of one pixel.
+    pub step: Vec4,
+}
+
+impl Optics {
+    /// With clip x = P₀₀·X + P₀₂·z + P₀₃ and clip w = P₃₂·z + P₃₃, all in units of the scene,
+    /// X = (x′·w − P₀₂·z − P₀₃)/P₀₀ at the device coordinate x′, which is linear over the pixels.
+    pub fn new(frame: &Frame) -> Result<Self, Error> {
+        let projection = Mat4::from_cols_array_2d(&frame.projection);
+        // In double precision, since the inverse of a projection with a near plane of a millimetre loses
+        // half of a float's digits.
+        let mm = DMat4::from_scale(DVec3::splat(frame.mm_per_unit.into()));
+        let inverse = (mm * projection.as_dmat4().inverse()).as_mat4();
+        let [x, y, w] = [0, 1, 3].map(|i| projection.row(i));
+        if !projection.is_finite() || !inverse.is_finite() || x.y != 0.0 || y.x != 0.0 {
+            return Err(Error::Projection {
+                got: frame.projection,
+                needs: "a finite, invertible projection whose x and y stay apart",
+            });
+        }
+        let distance = |depth: f32| {
+            let z = inverse.z_axis.z * depth + inverse.w_axis.z;
+            let z = z / (inverse.z_axis.w * depth + inverse.w_axis.w);
+            // An orthographic camera may see what is behind it, farther than what is before it.
+            if w.z == 0.0 { -z } else { z.abs() }
+        };
+        let far = if distance(0.0) > distance(1.0) {
+            0.0
+        } else {
+            1.0
+        };
+        let size = frame.rectangle().size();
+        let mm = frame.mm_per_unit;
+        let at = |ndc: f32, row: Vec4, scale: f32| {
+            [
+                (ndc * w.z - row.z) / scale,
+                (ndc * w.w - row.w) / scale * mm,
+            ]
+        };
+        let step = |ndc: f32, scale: f32| [ndc * w.z / scale, ndc * w.w / scale * mm];
+        let [ux, vx] = at(-1.0, x, x.x);
+        let [uy, vy] = at(1.0, y, y.y);
+        let [dux, dvx] = step(2.0 / size[0] as f32, x.x);
+        let [duy, dvy] = step(-2.0 / size[1] as f32, y.y);
+        Ok(Self {
+            inverse_projection: inverse,
+            far,
+            origin: Vec4::new(ux, uy, vx, vy),
+            step: Vec4::new(dux, duy, dvx, dvy),
+        })
+    }
+
+    /// Checks what the pyramid needs on top: depth that depends on z alone, in a right-handed view space.
+    pub fn check_depth_alone(frame: &Frame) -> Result<(), Error> {
+        let projection = Mat4::from_cols_array_2d(&frame.projection);
+        let [z, w] = [2, 3].map(|i| projection.row(i));
+        let needs = if [z.x, z.y, w.x, w.y].iter().any(|c| *c != 0.0) {
+            "depth that does not depend on x and y; Plan::exact takes oblique near planes"
+        } else if w.z > 0.0 {
+            "a right-handed view space, in front of the camera along -Z"
+        } else {
+            return Ok(());
+        };
+        Err(Error::Projection {
+            got: frame.projection,
+            needs,
+        })
+    }
+
+    /// z = (x·depth + y)/(z·depth + w), in mm.
+    pub fn depth_to_mm(&self) -> Vec4 {
+        let m = self.inverse_projection;
+        Vec4::new(m.z_axis.z, m.w_axis.z, m.z_axis.w, m.w_axis.w)
+    }
+
+    /// The mm between pixels of a surface that faces the camera, at z mm in view space: along a row
+    /// |x + y·z|, along a column |z + w·z|; signed as the axes of the picture are.
+    pub fn spacing(&self) -> Vec4 {
+        let s = self.step;
+        Vec4::new(s.z, s.x, s.w, s.y)
+    }
+}
