@@ -35,7 +35,7 @@ mod gpu;
 mod optics;
 #[cfg(feature = "physics")]
 pub mod physics;
-mod plan;
+pub mod plan;
 mod profile;
 mod pyramid;
 mod screen_space;
@@ -46,7 +46,7 @@ mod wgsl;
 
 pub use error::Error;
 pub use frame::{Frame, Output, Viewport};
-pub use plan::{DEFAULT_MAX_ERROR, Plan, Row};
+pub use plan::{DEFAULT_MAX_ERROR, Plan};
 pub use profile::{Gaussian, Profile};
 pub use screen_space::{ScreenSpace, View};
 pub use texture_space::{Atlas, TextureSpace};

@@ -2,12 +2,14 @@
 //!
 //! - C. L. Lawson, *Contributions to the theory of linear least maximum approximation*, 1961: weights that
 //!   grow where the error is large.
+//!   The weights of the end are of a linear program, as in a plan.
 //! - G. H. Golub & V. Pereyra, *The differentiation of pseudo-inverses and nonlinear least squares problems
 //!   whose variables separate*, SIAM J. Numer. Anal. 10, 1973: variances by descent, weights by least squares.
 
+use super::linear::nnls;
 use super::response::step;
 use super::{Response, number};
-use crate::plan::minimax::{minimax, nnls};
+use crate::plan::minimax::{self, Minimax};
 use crate::{Error, Gaussian, Profile};
 
 /// The nearest to a line of light, in mm, that a fit looks: on skin, nobody sees less.
@@ -162,14 +164,15 @@ impl Target {
         let (first, last) = (self.x_mm[0], self.x_mm[self.x_mm.len() - 1]);
         let n = ((4.0 * last / first).ln() / RATIO.ln()).ceil().min(40.0) as i32;
         let sigma = |i: i32| 0.25 * first * RATIO.powi(i);
-        let row = |x: f64| {
-            (0..=n)
-                .map(|i| step(x, sigma(i) * sigma(i)))
-                .collect::<Vec<_>>()
-        };
-        let at = |v: &[f64]| v.iter().copied().step_by(DENSER).collect::<Vec<_>>();
-        let rows: Vec<_> = at(&self.x_mm).into_iter().map(row).collect();
-        self.edges.each_ref().map(|e| minimax(&rows, &at(e)).1)
+        let search = Search::new(self);
+        let columns: Vec<_> = (0..=n)
+            .map(|i| search.column(sigma(i) * sigma(i)))
+            .collect();
+        search.edges.each_ref().map(|edge| {
+            let mixed = minimax::mix(&columns, &nearest(&columns, edge));
+            let off = mixed.iter().zip(edge).map(|(m, e)| (m - e).abs());
+            off.fold(0.0, f64::max)
+        })
     }
 
     fn errors(&self, profile: &Profile) -> [f64; 3] {
@@ -195,7 +198,7 @@ impl Target {
         let last = self.x_mm[self.x_mm.len() - 1];
         let search = Search::new(self);
         let see = |point: &Point| {
-            let profile = Profile::new(&point.gaussians())?;
+            let profile = search.profile(point)?;
             Ok::<_, Error>(Fit {
                 profile,
                 edge_error: self.errors(&profile),
@@ -225,11 +228,10 @@ impl Target {
     }
 }
 
-/// Variances and the best weights for them.
+/// Variances, and how good their best weights are.
 #[derive(Clone)]
 struct Point {
     log_variances: Vec<f64>,
-    weights: [Vec<f64>; 3],
     /// Σu·ΔE² and its slope.
     value: f64,
     slope: Vec<f64>,
@@ -237,19 +239,15 @@ struct Point {
     residuals: [Vec<f64>; 3],
 }
 
-impl Point {
-    fn gaussians(&self) -> Vec<Gaussian> {
-        let weight = |c: usize, j: usize| self.weights[c][j] as f32;
-        let gaussian = |(j, log): (usize, &f64)| Gaussian {
-            variance_mm2: log.exp().min(f64::from(f32::MAX)) as f32,
-            weight: [weight(0, j), weight(1, j), weight(2, j)],
-        };
-        self.log_variances
-            .iter()
-            .enumerate()
-            .map(gaussian)
-            .collect()
-    }
+/// The weights of columns, none negative and 1 in all, whose sum is nearest to these values at the worst.
+fn nearest(columns: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
+    let mut weights = Minimax::new(columns.len(), |_| true);
+    weights.solve(
+        columns,
+        &[minimax::Target::new(values.to_vec())],
+        f64::INFINITY,
+    );
+    weights.weights()
 }
 
 /// A search under way.
@@ -295,6 +293,29 @@ impl Search {
             x_mm: at(&target.x_mm),
             edges: target.edges.each_ref().map(|e| at(e)),
         }
+    }
+
+    /// What a Gaussian makes of a step edge.
+    fn column(&self, variance_mm2: f64) -> Vec<f64> {
+        self.x_mm.iter().map(|x| step(*x, variance_mm2)).collect()
+    }
+
+    /// The profile of these variances.
+    fn profile(&self, point: &Point) -> Result<Profile, Error> {
+        let variances: Vec<f64> = point.log_variances.iter().map(|log| log.exp()).collect();
+        let columns: Vec<_> = variances.iter().map(|v| self.column(*v)).collect();
+        let weights = self.edges.each_ref().map(|edge| nearest(&columns, edge));
+        let gaussian = |(j, v): (usize, &f64)| Gaussian {
+            variance_mm2: v.min(f64::from(f32::MAX)) as f32,
+            weight: [0, 1, 2].map(|c| weights[c][j] as f32),
+        };
+        Profile::new(
+            &variances
+                .iter()
+                .enumerate()
+                .map(gaussian)
+                .collect::<Vec<_>>(),
+        )
     }
 
     /// Variances of least squares.
@@ -394,7 +415,6 @@ impl Search {
         }
         let mut point = Point {
             log_variances,
-            weights: Default::default(),
             value: 0.0,
             slope: vec![0.0; k],
             residuals: Default::default(),
@@ -423,7 +443,6 @@ impl Search {
                 }
                 point.residuals[c].push(residual);
             }
-            point.weights[c] = w;
         }
         point
     }

@@ -238,37 +238,3 @@ pub(super) fn harmonics<const B: usize>(
         _ => (15.0 / (16.0 * PI)).sqrt() * sin * sin * (2.0 * cos_phi * cos_phi - 1.0),
     })
 }
-
-/// Solves the square system in place, by Gauss' elimination with pivots; `x` is the right side, then the
-/// solution.
-pub(super) fn solve(a: &mut [f64], x: &mut [f64]) {
-    let n = x.len();
-    for k in 0..n {
-        let size = |i: &usize| a[i * n + k].abs();
-        let pivot = (k..n)
-            .max_by(|i, j| size(i).total_cmp(&size(j)))
-            .unwrap_or(k);
-        if pivot != k {
-            for j in k..n {
-                a.swap(k * n + j, pivot * n + j);
-            }
-            x.swap(k, pivot);
-        }
-        let (above, below) = a.split_at_mut((k + 1) * n);
-        let row = &above[k * n + k..];
-        for i in k + 1..n {
-            let target = &mut below[(i - k - 1) * n + k..(i - k) * n];
-            let factor = target[0] / row[0];
-            if factor != 0.0 {
-                for (t, r) in target.iter_mut().zip(row) {
-                    *t -= factor * r;
-                }
-                x[i] -= factor * x[k];
-            }
-        }
-    }
-    for k in (0..n).rev() {
-        let known: f64 = (k + 1..n).map(|j| a[k * n + j] * x[j]).sum();
-        x[k] = (x[k] - known) / a[k * n + k];
-    }
-}

@@ -5,6 +5,7 @@ mod complex;
 mod diffusion;
 mod fit;
 mod kernel;
+mod linear;
 mod medium;
 mod pigments;
 pub mod presets;

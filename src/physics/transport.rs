@@ -15,11 +15,11 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::complex::Complex;
-use super::kernel::{Kernel, Ray, harmonics, solve};
+use super::kernel::{Kernel, Ray, harmonics};
+use super::linear::{nnls, solve};
 use super::quadrature::{Direction, directions, fresnel, gauss, henyey_greenstein};
 use super::{Layer, Medium, Response, number};
 use crate::Error;
-use crate::plan::minimax::nnls;
 
 /// How light comes in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
