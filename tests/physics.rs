@@ -936,7 +936,10 @@ fn profiles_take_no_time() {
     let layers = least(&|| fit(transport.responses(&layers).unwrap()));
     let spectral = least(&|| fit(Skin::LIGHT.responses(&transport).unwrap()));
     let forward = least(&|| fit(transport.responses(&skin1(0.8)).unwrap()));
-    println!("RGB {rgb:?}, three layers {layers:?}, spectral {spectral:?}, g = .8 {forward:?}");
+    let both = donner_jensen_2005(0.8).unwrap();
+    let both = least(&|| fit(transport.responses(&both).unwrap()));
+    println!("RGB {rgb:?}, three layers {layers:?}, spectral {spectral:?}");
+    println!("g = .8: {forward:?}, three layers {both:?}");
     if cfg!(not(debug_assertions)) {
         assert!(
             rgb.max(layers) < Duration::from_millis(200),
