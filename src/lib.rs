@@ -25,13 +25,16 @@
 //! it, and what does not fit is an [`Error`] that names it.
 //!
 //! Features of the device: none, and no more than WebGPU's default limits. Feature `json` of the crate:
-//! profiles and plans as JSON, and serde's traits for them.
+//! profiles and plans as JSON, and serde's traits for them. Feature `physics`: profiles from layers, pigments
+//! and scattering coefficients.
 
 mod error;
 mod exact;
 mod frame;
 mod gpu;
 mod optics;
+#[cfg(feature = "physics")]
+pub mod physics;
 pub mod plan;
 mod profile;
 mod pyramid;

@@ -20,7 +20,7 @@ const EXCHANGES: usize = 50;
 const ROUNDING: f64 = 1e-10;
 
 /// What a share of the mixture should be at every sample.
-pub(super) struct Target {
+pub(crate) struct Target {
     pub share: f64,
     pub values: Vec<f64>,
     /// How much larger than t its residuals may be.
@@ -51,7 +51,7 @@ impl Target {
 }
 
 /// Σⱼ xⱼ·columnⱼ.
-pub(super) fn mix(columns: &[Vec<f64>], x: &[f64]) -> Vec<f64> {
+pub(crate) fn mix(columns: &[Vec<f64>], x: &[f64]) -> Vec<f64> {
     let mut sum = vec![0.0; columns[0].len()];
     for (column, x) in columns.iter().zip(x).filter(|(_, x)| x.abs() > ROUNDING) {
         for (s, c) in sum.iter_mut().zip(column) {
@@ -74,7 +74,7 @@ pub(super) fn largest_residual(columns: &[Vec<f64>], x: &[f64], targets: &[Targe
 /// Nothing is lost when targets or constraints are added to those of an earlier solution: to go on from there
 /// takes a few exchanges.
 #[derive(Clone)]
-pub(super) struct Minimax {
+pub(crate) struct Minimax {
     /// The inverse of the matrix whose rows are the gradients, column by column: a column a constraint. The
     /// last row holds their multipliers, which are at least 0 where constraints are inequalities.
     inverse: Vec<Vec<f64>>,

@@ -7,7 +7,7 @@ mod fit;
 #[cfg(feature = "json")]
 mod json;
 mod kernels;
-mod minimax;
+pub(crate) mod minimax;
 #[rustfmt::skip] // as it was written by a program
 mod skin;
 mod stored;

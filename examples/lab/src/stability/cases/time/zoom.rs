@@ -22,7 +22,12 @@ fn zoomed(frame: f64) -> f64 {
 /// The frames of the zoom that lie around a change of the plan's blurs.
 fn around_switches(plan: &Plan) -> Vec<u32> {
     let rows = plan.rows(0);
-    let blurs = |i: usize| rows[i].weights.iter().rposition(|w| w.iter().any(|c| *c > 0.0));
+    let blurs = |i: usize| {
+        rows[i]
+            .weights
+            .iter()
+            .rposition(|w| w.iter().any(|c| *c > 0.0))
+    };
     // Weights are mixed from row to row: what is new fades in from the one to the other.
     let switches = (1..rows.len()).filter(|i| blurs(*i) != blurs(i - 1));
     let at: Vec<f64> = switches
