@@ -230,7 +230,7 @@ fn lattice_variance(variance_mm2: f32, spacing: f32) -> f32 {
     }
     let passed = exp(-0.5 * WAVE * WAVE * s);
     var w = 0.5 * (1.0 - passed) / (passed - COS_WAVE);
-    for (var step = 0; step < 6; step++) {
+    for (var step = 0; step < 11; step++) {
         let w4 = w * w * w * w;
         w = 0.5 * (1.0 - passed - 2.0 * (passed - COS_2WAVE) * w4) / (passed - COS_WAVE);
     }
