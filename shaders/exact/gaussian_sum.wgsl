@@ -50,7 +50,7 @@ struct Settings {
 // Of a profile.
 const MAX_GAUSSIANS = 8u;
 // Beyond 3.5 σ a Gaussian on a plane holds e^(−3.5²/2) = .2 % of its mass.
-const REACH_SIGMAS = 3.5;
+const REACH_SIGMAS: f32 = 3.5;
 // Up to this variance along each of three steps of the lattice, in steps², a kernel is summed over their
 // neighbours: there a row of taps is too coarse to be sheared.
 const SMALL = 0.4;
