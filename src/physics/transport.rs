@@ -54,7 +54,7 @@ impl Default for Transport {
 /// scattered often, which takes few azimuths. docs/physics.md has what each of these numbers costs.
 const CELLS: [f64; 2] = [12.0, 4.0];
 /// With moments beyond the first, whose end costs R more than cells do.
-const MOMENT_CELLS: [f64; 2] = [6.0, 4.0];
+const MOMENT_CELLS: [f64; 2] = [6.0, 3.0];
 /// Directions to either side of the critical angle, and for light that was scattered once, which a sharp
 /// wave shows by a narrow cone alone.
 const DIRECTIONS: [usize; 2] = [6, 16];
