@@ -84,8 +84,8 @@ pub fn read(path: &Path, layer: Option<&str>, size: [u32; 2], one: bool) -> Resu
     })
 }
 
-/// Checks a part before its pixels are decoded: a few damaged bytes can ask for all memory, by its windows or
-/// by what DWA says of sizes.
+/// Checks a part before its pixels are decoded: a few damaged bytes can ask for all memory, by its windows
+/// or by the sizes in DWA's data.
 fn check(header: &Header, [width, height]: [u32; 2]) -> Result<(), Error> {
     let Vec2(w, h) = header.shared_attributes.display_window.size;
     if [w, h] != [width as usize, height as usize] {

@@ -54,7 +54,7 @@ struct Layers(Vec<Layer>);
 struct Layer {
     /// From the directory of `gbuffer.json`.
     file: PathBuf,
-    /// Without it the file has nothing else.
+    /// None: the file has just one that fits.
     layer: Option<String>,
     #[serde(flatten)]
     unknown: Unknown,
@@ -194,10 +194,10 @@ impl Dump {
     /// The first pixel of the first file that cannot be used.
     pub fn read(camera: Camera, profiles: usize) -> Result<Self, Error> {
         let projection = camera.projection();
-        let count = camera.width as usize * camera.height as usize;
-        let mut irradiance = vec![[0.0, 0.0, 0.0, 1.0]; count];
+        let mut irradiance = Vec::new();
         for layer in &camera.files.irradiance.0 {
             let (path, Pixels { rgb, .. }) = camera.layer(layer, false)?;
+            irradiance.resize(rgb.len(), [0.0, 0.0, 0.0, 1.0]);
             for (i, &light) in rgb.as_flattened().iter().enumerate() {
                 let sum = &mut irradiance[i / 3][i % 3];
                 *sum += light;
@@ -209,7 +209,7 @@ impl Dump {
 
         let (depth_path, distance, depth_is_half) = camera.one("depth", &camera.files.depth)?;
         let has_ids = camera.files.profile_id.is_some();
-        let mut profile_id = vec![1; count];
+        let mut profile_id = vec![1; distance.len()];
         if let Some(source) = &camera.files.profile_id {
             let (path, ids, _) = camera.one("profile_id", source)?;
             let needs = format!("whole numbers from 0 to {profiles}, the last --profile");
@@ -224,7 +224,7 @@ impl Dump {
         // Whether depth grows with the distance.
         let Mat4 { z_axis, w_axis, .. } = projection;
         let is_forward = z_axis.z * w_axis.w < w_axis.z * z_axis.w;
-        let mut depth = vec![if is_forward { 1.0 } else { 0.0 }; count];
+        let mut depth = vec![if is_forward { 1.0 } else { 0.0 }; distance.len()];
         let mut depth_error_mm: f64 = 0.0;
         for (at, &distance) in distance.iter().enumerate() {
             let id = &mut profile_id[at];
