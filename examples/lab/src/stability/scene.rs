@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use glam::{DVec2, DVec3};
 
 use crate::stability::unwrapped::{Texel, Unwrapped};
-use crate::synthetic::{GBuffer, Hit, View};
+use crate::synthetic::{GBuffer, Hit, View, tilted_normal};
 
 /// Polar angle at which a sphere's island ends: what scatters to its visible half lies before it.
 const SPHERE_ENDS: f64 = 2.5;
@@ -15,13 +15,14 @@ pub enum Form {
     Plane {
         along: DVec3,
         down: DVec3,
-        side_mm: f64,
+        size_mm: DVec2,
     },
-    /// Endless; unrolled from its far side, `length_mm` of it.
+    /// Endless; `length_mm` of it is unrolled, its middle turned from the camera by so many radians.
     Cylinder {
         along: DVec3,
         rho_mm: f64,
         length_mm: f64,
+        turned: f64,
     },
     /// Unrolled by the polar angle from its near side.
     Sphere { rho_mm: f64 },
@@ -45,7 +46,17 @@ impl Form {
         Self::Plane {
             along: DVec3::X,
             down: DVec3::NEG_Y,
-            side_mm,
+            size_mm: DVec2::splat(side_mm),
+        }
+    }
+
+    /// A plane turned by `tilt` about the image axis at `axis`, both in degrees.
+    pub fn tilted(tilt: f64, axis: f64, side_mm: f64) -> Self {
+        let along = direction(axis);
+        Self::Plane {
+            along,
+            down: along.cross(tilted_normal(tilt, axis)),
+            size_mm: DVec2::splat(side_mm),
         }
     }
 
@@ -76,17 +87,19 @@ impl Form {
             Self::Plane {
                 along,
                 down,
-                side_mm,
+                size_mm,
             } => {
-                let point = (along * centred.x + down * centred.y) * side_mm;
-                Some((point, down.cross(along), side_mm * side_mm))
+                let place = centred * size_mm;
+                let point = along * place.x + down * place.y;
+                Some((point, down.cross(along), size_mm.element_product()))
             }
             Self::Cylinder {
                 along,
                 rho_mm,
                 length_mm,
+                turned,
             } => {
-                let (sin, cos) = (TAU * centred.x).sin_cos();
+                let (sin, cos) = (TAU * centred.x + turned).sin_cos();
                 let normal = along.cross(DVec3::Z) * sin + DVec3::Z * cos;
                 let point = rho_mm * normal + along * (length_mm * centred.y);
                 Some((point, normal, TAU * rho_mm * length_mm))
@@ -109,13 +122,17 @@ impl Form {
             Self::Plane {
                 along,
                 down,
-                side_mm,
-            } => DVec2::new(point.dot(along), point.dot(down)) / side_mm,
+                size_mm,
+            } => DVec2::new(point.dot(along), point.dot(down)) / size_mm,
             Self::Cylinder {
-                along, length_mm, ..
+                along,
+                length_mm,
+                turned,
+                ..
             } => {
-                let angle = point.dot(along.cross(DVec3::Z)).atan2(point.z);
-                DVec2::new(angle / TAU, point.dot(along) / length_mm)
+                let angle = point.dot(along.cross(DVec3::Z)).atan2(point.z) - turned;
+                let around = (angle / TAU + 0.5).rem_euclid(1.0) - 0.5;
+                DVec2::new(around, point.dot(along) / length_mm)
             }
             Self::Sphere { rho_mm } => {
                 let theta = (point.z / rho_mm).clamp(-1.0, 1.0).acos();
@@ -193,6 +210,11 @@ impl Scene {
         let at = self.0[surface].form.uv(point - self.0[surface].middle_mm);
         DVec2::new((surface as f64 + at.x) / self.0.len() as f64, at.y)
     }
+}
+
+/// A direction in the picture.
+pub fn direction(degrees: f64) -> DVec3 {
+    DVec2::from_angle(degrees.to_radians()).extend(0.0)
 }
 
 /// Light from a direction.
