@@ -58,8 +58,10 @@ pub struct Case {
     pub known: Vec<Known>,
     /// Whether its picture shows what no other does.
     pub is_pictured: bool,
-    pub run: Box<dyn Fn(&Lab) -> Result<Outcome, Error>>,
+    pub run: Run,
 }
+
+type Run = Box<dyn Fn(&Lab) -> Result<Outcome, Error>>;
 
 /// At `passes` or less a method passes, at `degrades` or less it is degraded, beyond it fails.
 #[derive(Clone, Copy, PartialEq)]

@@ -3,9 +3,11 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
+use subsurface::Profile;
 
 use crate::stability::unwrapped::{Texel, Unwrapped};
 use crate::synthetic::{GBuffer, Hit, View, tilted_normal};
+use crate::truth::closed_form::{scattered_cosine, scattered_cosine_around, scattered_step, step};
 
 /// Polar angle at which a sphere's island ends: what scatters to its visible half lies before it.
 const SPHERE_ENDS: f64 = 2.5;
@@ -29,12 +31,15 @@ pub enum Form {
 }
 
 /// Light by the point, from the middle of the surface, and the normal; `None` is a hole.
-pub type Light = Box<dyn Fn(DVec3, DVec3) -> Option<DVec3>>;
+type Light = Box<dyn Fn(DVec3, DVec3) -> Option<DVec3>>;
+/// The closed form of that light, scattered by skin.
+type Scattered = Box<dyn Fn(DVec3, DVec3) -> DVec3>;
 
 pub struct Surface {
-    pub form: Form,
-    pub middle_mm: DVec3,
-    pub light: Light,
+    form: Form,
+    middle_mm: DVec3,
+    light: Light,
+    scattered: Option<Scattered>,
 }
 
 /// Surfaces that hide each other, side by side in an atlas.
@@ -60,28 +65,32 @@ impl Form {
         }
     }
 
-    /// Where a ray meets it first, from its middle, and the normal there.
-    fn meet(&self, origin: DVec3, ray: DVec3) -> Option<(DVec3, DVec3)> {
-        match *self {
-            Self::Plane { along, down, .. } => {
-                let normal = down.cross(along);
-                let point = origin - ray * (origin.dot(normal) / ray.dot(normal));
-                Some((point, normal))
+    /// Where a ray meets it first, from its middle.
+    fn meet(&self, origin: DVec3, ray: DVec3) -> Option<DVec3> {
+        let along_ray = match *self {
+            Self::Plane { .. } => {
+                let normal = self.normal(DVec3::ZERO);
+                -origin.dot(normal) / ray.dot(normal)
             }
             Self::Cylinder { along, rho_mm, .. } => {
-                let (o, d) = (origin.reject_from(along), ray.reject_from(along));
-                let point = origin + ray * enters(o, d, rho_mm)?;
-                Some((point, point.reject_from(along) / rho_mm))
+                enters(origin.reject_from(along), ray.reject_from(along), rho_mm)?
             }
-            Self::Sphere { rho_mm } => {
-                let point = origin + ray * enters(origin, ray, rho_mm)?;
-                Some((point, point / rho_mm))
-            }
+            Self::Sphere { rho_mm } => enters(origin, ray, rho_mm)?,
+        };
+        Some(origin + ray * along_ray)
+    }
+
+    /// At a point of it.
+    fn normal(&self, point: DVec3) -> DVec3 {
+        match *self {
+            Self::Plane { along, down, .. } => down.cross(along),
+            Self::Cylinder { along, rho_mm, .. } => point.reject_from(along) / rho_mm,
+            Self::Sphere { rho_mm } => point / rho_mm,
         }
     }
 
-    /// The point at UVs from 0 to 1, the normal there, and the area of a unit of UV.
-    fn at(&self, uv: DVec2) -> Option<(DVec3, DVec3, f64)> {
+    /// The point at UVs from 0 to 1, and the area of a unit of UV.
+    fn at(&self, uv: DVec2) -> Option<(DVec3, f64)> {
         let centred = uv - 0.5;
         match *self {
             Self::Plane {
@@ -91,7 +100,7 @@ impl Form {
             } => {
                 let place = centred * size_mm;
                 let point = along * place.x + down * place.y;
-                Some((point, down.cross(along), size_mm.element_product()))
+                Some((point, size_mm.element_product()))
             }
             Self::Cylinder {
                 along,
@@ -102,7 +111,7 @@ impl Form {
                 let (sin, cos) = (TAU * centred.x + turned).sin_cos();
                 let normal = along.cross(DVec3::Z) * sin + DVec3::Z * cos;
                 let point = rho_mm * normal + along * (length_mm * centred.y);
-                Some((point, normal, TAU * rho_mm * length_mm))
+                Some((point, TAU * rho_mm * length_mm))
             }
             Self::Sphere { rho_mm } => {
                 let theta = 2.0 * SPHERE_ENDS * centred.length();
@@ -111,7 +120,7 @@ impl Form {
                 let normal = (around * sin).extend(cos);
                 let stretch = if theta > 0.0 { sin / theta } else { 1.0 };
                 let area_mm2 = (2.0 * SPHERE_ENDS * rho_mm).powi(2) * stretch;
-                (theta < SPHERE_ENDS).then_some((rho_mm * normal, normal, area_mm2))
+                (theta < SPHERE_ENDS).then_some((rho_mm * normal, area_mm2))
             }
         }
     }
@@ -151,13 +160,59 @@ fn enters(origin: DVec3, ray: DVec3, rho_mm: f64) -> Option<f64> {
 }
 
 impl Surface {
-    /// At a distance of 300 mm, with no holes.
-    pub fn new(form: Form, light: impl Fn(DVec3, DVec3) -> DVec3 + 'static) -> Self {
+    /// At a distance of 300 mm.
+    pub fn new(form: Form, light: impl Fn(DVec3, DVec3) -> Option<DVec3> + 'static) -> Self {
         Self {
             form,
             middle_mm: DVec3::new(0.0, 0.0, -300.0),
-            light: Box::new(move |point, normal| Some(light(point, normal))),
+            light: Box::new(light),
+            scattered: None,
         }
+    }
+
+    /// Whose scattered light is known.
+    pub fn solved(
+        form: Form,
+        light: impl Fn(DVec3, DVec3) -> DVec3 + 'static,
+        scattered: impl Fn(DVec3, DVec3) -> DVec3 + 'static,
+    ) -> Self {
+        Self {
+            scattered: Some(Box::new(scattered)),
+            ..Self::new(form, move |point, normal| Some(light(point, normal)))
+        }
+    }
+
+    /// Under the same light everywhere.
+    pub fn even(form: Form, light: f64) -> Self {
+        let light = DVec3::splat(light);
+        Self::solved(form, move |_, _| light, move |_, _| light)
+    }
+
+    /// A plane with an edge of light, `at_mm` from its middle across the edge, soft by this variance.
+    pub fn edge(form: Form, across: DVec3, at_mm: f64, blur_mm2: f64) -> Self {
+        let place = move |point: DVec3| point.dot(across) - at_mm;
+        Self::solved(
+            form,
+            move |point, _| DVec3::splat(step(place(point), blur_mm2)),
+            move |point, _| scattered_step(place(point), blur_mm2, &Profile::SKIN),
+        )
+    }
+
+    /// A sphere, or a cylinder lit across, under light from afar.
+    pub fn lit(form: Form, light: DVec3) -> Self {
+        let scattered: Box<dyn Fn(f64) -> DVec3> = match form {
+            Form::Sphere { rho_mm } => Box::new(scattered_cosine(rho_mm, &Profile::SKIN)),
+            Form::Plane { .. } => Box::new(DVec3::splat),
+            Form::Cylinder { rho_mm, .. } => {
+                let scattered = scattered_cosine_around(rho_mm, &Profile::SKIN);
+                Box::new(move |cosine| scattered(cosine.clamp(-1.0, 1.0).acos()))
+            }
+        };
+        Self::solved(
+            form,
+            move |_, normal| DVec3::splat(normal.dot(light).max(0.0)),
+            move |_, normal| scattered(normal.dot(light)),
+        )
     }
 
     pub fn moved(mut self, by_mm: DVec3) -> Self {
@@ -166,7 +221,8 @@ impl Surface {
     }
 
     fn hit(&self, origin: DVec3, ray: DVec3) -> Option<Hit> {
-        let (point, normal) = self.form.meet(origin - self.middle_mm, ray)?;
+        let point = self.form.meet(origin - self.middle_mm, ray)?;
+        let normal = self.form.normal(point);
         Some(Hit {
             irradiance: (self.light)(point, normal)?,
             point: point + self.middle_mm,
@@ -196,13 +252,24 @@ impl Scene {
         Unwrapped::new([width * count as u32, height], |uv| {
             let along = uv.x * count as f64;
             let surface = &self.0[along as usize];
-            let (point, normal, area_mm2) = surface.form.at(DVec2::new(along.fract(), uv.y))?;
+            let (point, area_mm2) = surface.form.at(DVec2::new(along.fract(), uv.y))?;
             Some(Texel {
                 point_mm: point + surface.middle_mm,
-                irradiance: (surface.light)(point, normal)?,
+                irradiance: (surface.light)(point, surface.form.normal(point))?,
                 area_mm2: area_mm2 * texel_uv2,
             })
         })
+    }
+
+    /// The closed form at a point of a surface.
+    pub fn scattered(&self, surface: usize, point: DVec3) -> DVec3 {
+        let surface = &self.0[surface];
+        let point = point - surface.middle_mm;
+        let scattered = surface
+            .scattered
+            .as_ref()
+            .expect("a surface that is solved");
+        scattered(point, surface.form.normal(point))
     }
 
     /// Where in the atlas a point of a surface lies.
@@ -215,11 +282,6 @@ impl Scene {
 /// A direction in the picture.
 pub fn direction(degrees: f64) -> DVec3 {
     DVec2::from_angle(degrees.to_radians()).extend(0.0)
-}
-
-/// Light from a direction.
-pub fn lambert(direction: DVec3) -> impl Fn(DVec3, DVec3) -> DVec3 {
-    move |_, normal| DVec3::splat(normal.dot(direction).max(0.0))
 }
 
 /// A direction `degrees` from the camera's, towards `side` in the picture.

@@ -181,10 +181,8 @@ pub fn errors(
 }
 
 /// One surface that stands still, and points of it that are followed through the picture.
-pub struct Followed<'a> {
+pub struct Followed {
     pub scene: Scene,
-    /// The scattered light at a point of it.
-    pub scattered: &'a dyn Fn(DVec3) -> DVec3,
     /// Of its atlas.
     pub texels: [u32; 2],
     pub points: Vec<DVec3>,
@@ -206,7 +204,7 @@ pub fn grid(half_mm: f64) -> impl Iterator<Item = DVec2> {
     (0..rows).flat_map(row)
 }
 
-impl Followed<'_> {
+impl Followed {
     /// How far every method's errors at the points swing, as cameras see them that turn the scene to their
     /// view space.
     ///
@@ -230,7 +228,7 @@ impl Followed<'_> {
             let taps = taps(&g, self.points.iter().map(|p| to_view.transform_point3(*p)));
             let places = taps.iter().map(|t| from_view.transform_point3(t.point));
             let places: Vec<DVec3> = places.collect();
-            let truths: Vec<DVec3> = places.iter().map(|p| (self.scattered)(*p)).collect();
+            let truths: Vec<DVec3> = places.iter().map(|p| self.scene.scattered(0, *p)).collect();
             let at_taps = |r: Vec<Vec3>| errors(&taps, &truths, taps.iter().map(|t| r[t.pixel]));
             let errors: Vec<_> = results.map(|(m, r)| (m, at_taps(r))).collect();
             uvs.extend(places.into_iter().map(|p| self.scene.uv(0, p)));
@@ -244,7 +242,11 @@ impl Followed<'_> {
                 let fetched = fetched[number as usize * count..][..count].iter().copied();
                 of_methods.push((*method, errors(&taps, &truths, fetched)));
             }
-            let truth = self.points.iter().map(|p| (self.scattered)(*p)).collect();
+            let truth = self
+                .points
+                .iter()
+                .map(|p| self.scene.scattered(0, *p))
+                .collect();
             track.push(number, truth, of_methods);
         }
         // Few enough points for a small picture.

@@ -12,31 +12,32 @@ use crate::stability::unwrapped::Unwrapped;
 use crate::synthetic::{GBuffer, Hit, View};
 
 /// What a method is held to.
-pub enum Truth<'a> {
+#[derive(Clone, Copy)]
+pub enum Truth {
     /// Eq. 7 over what the camera sees.
     Visible,
     /// Eq. 7 over the surfaces whole, as the atlas holds them.
     Whole,
-    /// Eq. 7 in closed form, by what a pixel sees.
-    Paper(&'a dyn Fn(&Hit) -> DVec3),
+    /// Eq. 7 in closed form.
+    Closed,
 }
 
 /// Pixels and what is true there.
 pub type Known = Vec<(usize, DVec3)>;
 
-pub struct Trial<'a> {
+pub struct Trial {
     pub scene: Scene,
     pub view: View,
     /// Light where there is no surface.
-    pub background: f64,
+    background: f64,
     /// Where pixels are asked for, and what a picture shows.
-    pub crop: Crop,
+    crop: Crop,
     /// Of which pixels; those beside another surface, or beside none, are never asked for.
-    pub asked: &'a dyn Fn(&Hit) -> bool,
+    asked: Box<dyn Fn(&Hit) -> bool>,
     /// For the methods in screen space.
-    pub truth: Truth<'a>,
+    truth: Truth,
     /// For those in texture space: texels of each island, and what they are held to.
-    pub atlas: Option<([u32; 2], Truth<'a>)>,
+    atlas: Option<([u32; 2], Truth)>,
 }
 
 /// A frame, scattered by the methods in screen space.
@@ -45,21 +46,39 @@ pub struct Look {
     crop: Crop,
     results: Results,
     /// Pixels that are asked for, the surface that each shows, and what of it.
-    pub pixels: Vec<(usize, usize, Hit)>,
+    pixels: Vec<(usize, usize, Hit)>,
     truth: Known,
 }
 
-impl<'a> Trial<'a> {
+impl Trial {
     /// All pixels of `crop`, before nothing, in screen space alone.
-    pub fn new(scene: Scene, view: View, crop: Crop, truth: Truth<'a>) -> Self {
+    pub fn new(scene: Scene, view: View, crop: Crop, truth: Truth) -> Self {
         Self {
             scene,
             view,
             background: 0.0,
             crop,
-            asked: &|_| true,
+            asked: Box::new(|_| true),
             truth,
             atlas: None,
+        }
+    }
+
+    pub fn before(self, background: f64) -> Self {
+        Self { background, ..self }
+    }
+
+    pub fn only_where(self, asked: impl Fn(&Hit) -> bool + 'static) -> Self {
+        Self {
+            asked: Box::new(asked),
+            ..self
+        }
+    }
+
+    pub fn atlas(self, texels: [u32; 2], truth: Truth) -> Self {
+        Self {
+            atlas: Some((texels, truth)),
+            ..self
         }
     }
 
@@ -69,11 +88,11 @@ impl<'a> Trial<'a> {
     /// Inputs that a method refuses.
     pub fn run(&self, lab: &Lab) -> Result<Outcome, Error> {
         let look = self.look(lab)?;
-        let Some((texels, truth)) = &self.atlas else {
+        let Some((texels, truth)) = self.atlas else {
             return Ok(look.outcome(worst));
         };
-        let atlas = self.scene.unwrap(*texels);
-        let truth = look.held_to(truth, Some(&atlas));
+        let atlas = self.scene.unwrap(texels);
+        let truth = look.held_to(truth, &self.scene, Some(&atlas));
         let uv = |surface, point| Some(self.scene.uv(surface, point));
         look.textured(lab, &atlas, uv, &truth, worst)
     }
@@ -96,7 +115,7 @@ impl<'a> Trial<'a> {
             truth: vec![],
             g,
         };
-        look.truth = look.held_to(&self.truth, None);
+        look.truth = look.held_to(self.truth, &self.scene, None);
         Ok(look)
     }
 
@@ -168,19 +187,24 @@ impl Look {
     }
 
     /// What is true of the pixels that are asked for.
-    pub fn held_to(&self, truth: &Truth, atlas: Option<&Unwrapped>) -> Known {
+    pub fn held_to(&self, truth: Truth, scene: &Scene, atlas: Option<&Unwrapped>) -> Known {
         let pixels = self.pixels.iter().map(|(pixel, ..)| *pixel);
-        let hits = self.pixels.iter().map(|(.., hit)| hit);
         let truth = match truth {
             Truth::Visible => {
                 let pixels: Vec<usize> = pixels.clone().collect();
                 self.g.visible_integral(&pixels, &Profile::SKIN)
             }
             Truth::Whole => {
-                let points: Vec<_> = hits.map(|h| (h.point, h.irradiance)).collect();
-                atlas.map_or(vec![], |atlas| atlas.truth(&points))
+                let points = self.pixels.iter().map(|(.., h)| (h.point, h.irradiance));
+                atlas.map_or(vec![], |atlas| atlas.truth(&points.collect::<Vec<_>>()))
             }
-            Truth::Paper(paper) => hits.map(paper).collect(),
+            Truth::Closed => {
+                let places = self
+                    .pixels
+                    .iter()
+                    .map(|(_, i, h)| scene.scattered(*i, h.point));
+                places.collect()
+            }
         };
         pixels.zip(truth).collect()
     }

@@ -1,7 +1,6 @@
 //! A flat square of skin under a soft edge of light, laid out in an atlas one way or another.
 
 use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
-use subsurface::Profile;
 
 use super::Shared;
 use crate::Error;
@@ -10,8 +9,8 @@ use crate::stability::lab::Lab;
 use crate::stability::scene::{Form, Scene, Surface};
 use crate::stability::trial::{Crop, Look, Measure, Trial, Truth};
 use crate::stability::unwrapped::{Texel, Unwrapped};
-use crate::synthetic::{Hit, View};
-use crate::truth::closed_form::{scattered_step, step};
+use crate::synthetic::View;
+use crate::truth::closed_form::step;
 
 /// Side of the square.
 pub const SIDE_MM: f64 = 28.0;
@@ -50,16 +49,15 @@ impl Square {
         DVec3::splat(if is_behind { 1.0 - lit } else { lit })
     }
 
-    fn look(&self, lab: &Lab) -> Result<Look, Error> {
+    fn trial(&self) -> Trial {
         let (pixels, px_per_mm) = if self.quick { (128, 5.0) } else { (224, 8.0) };
         let view = View::orthographic([pixels; 2], px_per_mm);
-        let square = self.clone();
-        let light = move |point: DVec3, _| square.light(point.truncate(), false);
-        let scene = Scene(vec![Surface::new(Form::facing(SIDE_MM), light)]);
+        let across = self.across.extend(0.0);
+        let square = Surface::edge(Form::facing(SIDE_MM), across, 0.0, self.soft_mm.powi(2));
         let side = (ASKED_MM * px_per_mm) as u32;
         // Half as high as wide is enough to see.
         let crop = Crop::middle(&view, [side, side / 2]);
-        Trial::new(scene, view, crop, Truth::Visible).look(lab)
+        Trial::new(Scene(vec![square]), view, crop, Truth::Visible)
     }
 
     /// Every method on it; in texture space laid out like this, and held to the square without end.
@@ -67,12 +65,9 @@ impl Square {
     /// # Errors
     /// Inputs that a method refuses.
     pub fn run(&self, lab: &Lab, layout: &Layout, measure: Measure) -> Result<Outcome, Error> {
-        let look = self.look.get(|| self.look(lab))?;
-        let paper = |hit: &Hit| {
-            let place = hit.point.truncate().dot(self.across);
-            scattered_step(place, self.soft_mm.powi(2), &Profile::SKIN)
-        };
-        let truth = look.held_to(&Truth::Paper(&paper), None);
+        let trial = self.trial();
+        let look = self.look.get(|| trial.look(lab))?;
+        let truth = look.held_to(Truth::Closed, &trial.scene, None);
         let uv = |_, point: DVec3| layout.uv(point.truncate());
         look.textured(lab, &layout.unwrap(self), uv, &truth, measure)
     }

@@ -16,6 +16,7 @@ use std::rc::Rc;
 
 use crate::Error;
 use crate::stability::case::{Bound, Case};
+use crate::stability::trial::Trial;
 
 /// A step of 8 bits.
 const STEP: f64 = 1.0 / 255.0;
@@ -65,6 +66,16 @@ pub fn all(quick: bool) -> Vec<Case> {
     let named =
         |(group, cases): (_, Vec<Case>)| cases.into_iter().map(move |c| Case { group, ..c });
     groups.into_iter().flat_map(named).collect()
+}
+
+/// A case of one frame.
+fn trial(
+    name: impl Into<String>,
+    what: impl Into<String>,
+    bound: Bound,
+    make: impl Fn() -> Trial + 'static,
+) -> Case {
+    Case::new(name, what, bound, move |lab| make().run(lab))
 }
 
 /// What several cases look at, made by the first of them.

@@ -3,17 +3,16 @@
 use glam::{DVec2, DVec3, Vec2};
 
 use super::islands::{HALF_MM, Island, Layout, SIDE_MM, Square};
-use super::{GRADIENT, STEP, sheet};
+use super::{GRADIENT, STEP, sheet, trial};
 use crate::Error;
 use crate::method;
 use crate::stability::case::{ATLAS, Bound, Case, Figures, Known, PLAN, by_nature, known};
 use crate::stability::inputs::Texels;
 use crate::stability::lab::Lab;
-use crate::stability::scene::{Form, Scene, Surface, from_camera, lambert};
+use crate::stability::scene::{Form, Scene, Surface, from_camera};
 use crate::stability::trial::{Crop, Measure, Trial, Truth, apart, merge, relative_rms, worst};
 use crate::stability::unwrapped::{Texel, Unwrapped};
-use crate::synthetic::{GBuffer, Hit, View};
-use crate::truth::closed_form::scattered_cosine_around;
+use crate::synthetic::{GBuffer, View};
 
 const SEAM: &str = "Passes along u and v end with the island; what lies across its seam is \
     elsewhere in the atlas, and to find it by position would mean to search the atlas for every \
@@ -165,43 +164,32 @@ fn squares(quick: bool) -> Vec<Case> {
 
 /// A cylinder lit from the side, unrolled with its seam in view or behind.
 fn cylinder(in_view: bool, quick: bool) -> Case {
-    const RHO_MM: f64 = 8.0;
-    let run = move |lab: &Lab| {
+    let make = move || {
         let (pixels, px_per_mm, texels) = match quick {
             true => (128, 5.0, [264, 105]),
             false => (224, 8.0, [420, 167]),
         };
         let form = Form::Cylinder {
             along: DVec3::Y,
-            rho_mm: RHO_MM,
+            rho_mm: 8.0,
             length_mm: 20.0,
             turned: if in_view { std::f64::consts::PI } else { 0.0 },
         };
-        let light = from_camera(60.0, DVec3::X);
-        let scattered = scattered_cosine_around(RHO_MM, &subsurface::Profile::SKIN);
-        let paper = |h: &Hit| scattered(h.normal.x.atan2(h.normal.z) - 60f64.to_radians());
+        let scene = Scene(vec![Surface::lit(form, from_camera(60.0, DVec3::X))]);
         let view = View::orthographic([pixels; 2], px_per_mm);
         let crop = Crop::middle(&view, [pixels * 4 / 5, pixels * 3 / 10]);
-        Trial {
-            asked: &|hit| hit.normal.z > 0.3,
-            atlas: Some((texels, Truth::Paper(&paper))),
-            ..Trial::new(
-                Scene(vec![Surface::new(form, lambert(light))]),
-                view,
-                crop,
-                Truth::Visible,
-            )
-        }
-        .run(lab)
+        Trial::new(scene, view, crop, Truth::Visible)
+            .only_where(|hit| hit.normal.z > 0.3)
+            .atlas(texels, Truth::Closed)
     };
-    let what = "A cylinder of 8 mm radius lit from 60 degrees to the side, unrolled into one \
-        island whose seam faces the camera or lies behind: largest difference where it is turned \
-        by less than 73 degrees from the camera, in screen space to the visible integral, in \
-        texture space to the closed form.";
+    let what = "A cylinder of 8 mm radius lit from 60 degrees to the side, unrolled into one island \
+        whose seam faces the camera or lies behind: largest difference where it is turned by less \
+        than 73 degrees from the camera, in screen space to the visible integral, in texture space to \
+        the closed form.";
     match in_view {
-        true => Case::new("a cylinder's seam in view", what, GRADIENT, run)
+        true => trial("a cylinder's seam in view", what, GRADIENT, make)
             .known([known(ATLAS, 0.08, SEAM)]),
-        false => Case::new("a cylinder's seam behind", what, GRADIENT, run),
+        false => trial("a cylinder's seam behind", what, GRADIENT, make),
     }
 }
 
@@ -268,11 +256,10 @@ fn many_heads() -> Case {
 const HEAD_MM: f64 = 8.0;
 
 /// Every head is lit from a side of its own.
-fn head_light(head: u32, normal: DVec3) -> DVec3 {
-    let light = DVec2::from_angle(f64::from(head) * 2.4)
+fn head_light(head: u32) -> DVec3 {
+    DVec2::from_angle(f64::from(head) * 2.4)
         .extend(1.0)
-        .normalize();
-    lambert(light)(DVec3::ZERO, normal)
+        .normalize()
 }
 
 /// The frame with these heads; neighbours stand 40 mm or more behind each other.
@@ -281,8 +268,7 @@ fn look_at_heads(heads: impl IntoIterator<Item = u32>) -> GBuffer {
         let [column, row] = [head % 3, head / 3].map(f64::from);
         let behind_mm = -40.0 * f64::from((head % 3 + 2 * (head / 3)) % 4);
         let place = DVec3::new(17.5 * (column - 1.0), 17.5 * (row - 1.0), behind_mm);
-        let form = Form::Sphere { rho_mm: HEAD_MM };
-        Surface::new(form, move |_, normal| head_light(head, normal)).moved(place)
+        Surface::lit(Form::Sphere { rho_mm: HEAD_MM }, head_light(head)).moved(place)
     };
     let scene = Scene(heads.into_iter().map(head).collect());
     scene.shoot(&View::orthographic([158; 2], 3.0))
@@ -341,7 +327,7 @@ fn unwrap_head(head: u32) -> Unwrapped {
         let normal = (off.normalize_or(DVec2::X) * sin).extend(cos);
         (off.length() < 1.0).then(|| Texel {
             point_mm: normal * HEAD_MM,
-            irradiance: head_light(head, normal),
+            irradiance: DVec3::splat(normal.dot(head_light(head)).max(0.0)),
             area_mm2: texel_mm * texel_mm,
         })
     })

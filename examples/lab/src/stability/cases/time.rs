@@ -3,12 +3,12 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3, Vec3};
 use subsurface::{Plan, Profile};
 
 use super::{FLICKER, FOUND, GRADIENT, REACH_MM, STEP, Shared};
 use crate::Error;
-use crate::stability::case::{ATLAS, Bound, Case, Figures, Outcome, PLAN, known};
+use crate::stability::case::{ATLAS, Bound, Case, Figures, PLAN, known};
 use crate::stability::inputs::Texels;
 use crate::stability::lab::Lab;
 use crate::stability::scene::{Form, Scene, Surface, direction};
@@ -16,7 +16,7 @@ use crate::stability::track::{FOLLOWED, Followed, Track, errors, grid, read, tap
 use crate::stability::trial::{Crop, largest, merge};
 use crate::synthetic::{Hit, View, plane, tilted_normal};
 use crate::truth::closed_form::{
-    legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_spot, scattered_step, step,
+    legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_spot,
 };
 
 const PX_PER_MM: f64 = 4.0;
@@ -52,12 +52,12 @@ fn pan(quick: bool) -> Vec<DAffine3> {
 /// A plane under waves of all directions.
 fn over_a_plane(tilt: f64, quick: bool) -> Case {
     let what = format!(
-        "A plane tilted by 0 or 40 degrees in perspective, lit by waves of 8 px and longer at 4 \
-         px/mm, under a camera that pans by fractions of a pixel; 2 texels a pixel. {FOLLOWED}"
+        "A plane tilted by 0 or 40 degrees in perspective, lit by waves of 8 px and longer at 4 px/mm, \
+         under a camera that pans by fractions of a pixel; 2 texels a pixel. {FOLLOWED}"
     );
-    let lattices = "Taps of the pyramid lie on lattices of whole pixels, each slope has one of \
-        its own, and a simple tile one for all its pixels: a point changes from one to another \
-        as tiles pass over it. Use the exact sum.";
+    let why = "Taps of the pyramid lie on lattices of whole pixels, each slope has one of its own, and \
+        a simple tile one for all its pixels: a point changes from one to another as tiles pass over \
+        it. Use the exact sum.";
     let case = Case::new(
         format!("pan over a plane at {tilt}°"),
         what,
@@ -72,48 +72,43 @@ fn over_a_plane(tilt: f64, quick: bool) -> Case {
                 (1.6, 140.0, 0.12),
                 (0.6, 35.0, 0.14),
             ];
-            let light = move |place: DVec3, passed: &dyn Fn(f64) -> DVec3| {
+            let normal = tilted_normal(tilt, 15.0);
+            let along = DVec3::X.reject_from_normalized(normal).normalize();
+            let down = along.cross(normal);
+            let light = move |point: DVec3, passed: fn(f64) -> DVec3| {
+                let place = DVec3::new(point.dot(along), -point.dot(down), 0.0);
                 let wave = |(rad_per_mm, degrees, share): (f64, f64, f64)| {
                     let phase = rad_per_mm * direction(degrees).dot(place);
                     share * phase.sin() * passed(rad_per_mm)
                 };
                 DVec3::splat(0.5) + waves.into_iter().map(wave).sum::<DVec3>()
             };
-            let normal = tilted_normal(tilt, 15.0);
-            let along = DVec3::X.reject_from_normalized(normal).normalize();
-            let down = along.cross(normal);
-            let place = move |p: DVec3| DVec3::new(p.dot(along), -p.dot(down), 0.0);
             let form = Form::Plane {
                 along,
                 down,
                 size_mm: DVec2::splat(28.0),
             };
-            let mut surface = Surface::new(form, move |p, _| light(place(p), &|_| DVec3::ONE));
-            surface.middle_mm = DVec3::NEG_Z * distance_mm;
-            let middle_mm = surface.middle_mm;
-            let passed = |rad_per_mm: f64| passed_wave(rad_per_mm, &Profile::SKIN);
-            let points = grid(3.0).map(|at| middle_mm + at.x * along - at.y * down);
-            Followed {
-                scene: Scene(vec![surface]),
-                scattered: &|point| light(place(point - middle_mm), &passed),
+            let all = move |point, _| light(point, |_| DVec3::ONE);
+            let scattered = move |point, _| light(point, |k| passed_wave(k, &Profile::SKIN));
+            let moved = DVec3::Z * (300.0 - distance_mm);
+            let points = grid(3.0).map(|at| MIDDLE + moved + at.x * along - at.y * down);
+            let followed = Followed {
+                scene: Scene(vec![Surface::solved(form, all, scattered).moved(moved)]),
                 texels: [224; 2],
                 points: points.collect(),
-            }
-            .swing(lab, View::perspective([128; 2], fov_degrees), &pan(quick))
+            };
+            followed.swing(lab, View::perspective([128; 2], fov_degrees), &pan(quick))
         },
     );
-    match tilt > 0.0 {
-        true => case.known([known(PLAN, 0.0095, lattices)]),
-        false => case,
-    }
+    case.known((tilt > 0.0).then(|| known(PLAN, 0.0095, why)))
 }
 
 /// A ball with a terminator, and rings of light.
 fn over_a_sphere(quick: bool) -> Case {
     const RINGS: usize = 24;
     let what = format!(
-        "A ball of 10 mm radius at 4 px/mm, lit from the side and by two sets of rings 10 px \
-         wide, where n_z is above 0.6; 1.5 texels a pixel. {FOLLOWED}"
+        "A ball of 10 mm radius at 4 px/mm, lit from the side and by two sets of rings 10 px wide, where \
+         n_z is above 0.6; 1.5 texels a pixel. {FOLLOWED}"
     );
     Case::new("pan over a sphere", what, FLICKER, move |lab| {
         let rho_mm = 10.0;
@@ -124,25 +119,26 @@ fn over_a_sphere(quick: bool) -> Case {
             let at = |pole: &DVec3| legendre(normal.dot(*pole)).nth(RINGS).unwrap_or(0.0);
             poles.iter().map(at).sum()
         };
-        let light = |sun: DVec3, rings: DVec3| 0.6 * sun + 0.2 + 0.1 * rings;
-        let irradiance =
-            move |_, n: DVec3| light(DVec3::splat(n.dot(sun).max(0.0)), DVec3::splat(rings(n)));
+        let light =
+            move |_, n: DVec3| DVec3::splat(0.6 * n.dot(sun).max(0.0) + 0.2 + 0.1 * rings(n));
         let scattered_sun = scattered_cosine(rho_mm, &Profile::SKIN);
         let passed = passed_harmonics(rho_mm, RINGS + 1, &Profile::SKIN)[RINGS];
+        let scattered =
+            move |_, n: DVec3| 0.6 * scattered_sun(n.dot(sun)) + 0.2 + 0.1 * passed * rings(n);
         let on_sphere = |place: DVec2| {
             let depth = (rho_mm * rho_mm - place.length_squared()).sqrt();
             MIDDLE + place.extend(depth)
         };
-        Followed {
-            scene: Scene(vec![Surface::new(Form::Sphere { rho_mm }, irradiance)]),
-            scattered: &|point| {
-                let n = (point - MIDDLE) / rho_mm;
-                light(scattered_sun(n.dot(sun)), passed * rings(n))
-            },
+        let followed = Followed {
+            scene: Scene(vec![Surface::solved(
+                Form::Sphere { rho_mm },
+                light,
+                scattered,
+            )]),
             texels: [304; 2],
             points: grid(5.5).map(on_sphere).collect(),
-        }
-        .swing(lab, View::orthographic([112; 2], PX_PER_MM), &pan(quick))
+        };
+        followed.swing(lab, View::orthographic([112; 2], PX_PER_MM), &pan(quick))
     })
 }
 
@@ -195,17 +191,14 @@ fn past_a_layer(quick: bool) -> Case {
 
 /// An edge along a column, and a camera that pans along it by whole pixels.
 fn by_whole_pixels() -> Case {
-    let what = "A soft edge of light (σ of 1 px) along the columns, 4 px/mm, and a camera that \
-        pans along it by whole pixels. The frame stays the same, and so do the results, while \
-        points of the surface move up through them: the most that the error at one of them \
-        swings. Noise that is drawn for each pixel of the frame does not move with the skin.";
+    let what = "A soft edge of light (σ of 1 px) along the columns, 4 px/mm, and a camera that pans along \
+        it by whole pixels. The frame stays the same, and so do the results, while points of the surface \
+        move up through them: the most that the error at one of them swings. Noise that is drawn for each \
+        pixel of the frame does not move with the skin.";
     Case::new("pan by whole pixels", what, FLICKER, |lab| {
-        let view = View::orthographic([112; 2], PX_PER_MM);
         let border = (REACH_MM * PX_PER_MM).ceil() as u32;
         let side = 112 - 2 * border;
-        let crop = Crop::middle(&view, [side; 2]);
-        let still = Still::edge(view, crop, 28.0, DVec3::X, 0.0);
-        let (truth, errors) = still.errors(lab)?;
+        let (truth, errors) = still(lab, edge(28.0, DVec3::X, 0.0), 112, side, 112)?;
         let mut track = Track::default();
         for number in 0..side {
             let row = (number * side) as usize..((number + 1) * side) as usize;
@@ -219,31 +212,28 @@ fn by_whole_pixels() -> Case {
 /// A spot of light, and a camera that turns about its own axis.
 fn roll(quick: bool) -> Case {
     let what = format!(
-        "A spot of light on a plane, σ of 2 px at 4 px/mm, under a camera that turns by 90 \
-         degrees about its axis; 2 texels a pixel. A kernel that is not round turns with the \
-         camera. {FOLLOWED}"
+        "A spot of light on a plane, σ of 2 px at 4 px/mm, under a camera that turns by 90 degrees about \
+         its axis; 2 texels a pixel. A kernel that is not round turns with the camera. {FOLLOWED}"
     );
-    let why = "The final pass fetches bilinearly, which flattens the tip of the spot wherever a \
-        pixel falls between texels. Use a finer atlas, or a cubic fetch.";
+    let why = "The final pass fetches bilinearly, which flattens the tip of the spot wherever a pixel \
+        falls between texels. Use a finer atlas, or a cubic fetch.";
     Case::new("camera rolls over a spot", what, FLICKER, move |lab| {
         let (spot, spot_mm2) = (DVec3::new(0.13, 0.21, 0.0), (2.0 / PX_PER_MM).powi(2));
         let light =
             move |p: DVec3, _| DVec3::splat((-p.distance_squared(spot) / (2.0 * spot_mm2)).exp());
+        let scattered =
+            move |p: DVec3, _| scattered_spot(p.distance(spot), spot_mm2, &Profile::SKIN);
         let turns = if quick { 15 } else { 90 };
         let turned = |i| DAffine3::from_rotation_z(FRAC_PI_2 * f64::from(i) / f64::from(turns));
         let cameras: Vec<DAffine3> = (0..=turns).map(turned).collect();
-        Followed {
-            scene: Scene(vec![Surface::new(Form::facing(32.0), light)]),
-            scattered: &|point| {
-                let r_mm = (point - MIDDLE).distance(spot);
-                scattered_spot(r_mm, spot_mm2, &Profile::SKIN)
-            },
+        let followed = Followed {
+            scene: Scene(vec![Surface::solved(Form::facing(32.0), light, scattered)]),
             texels: [256; 2],
             points: grid(3.0)
                 .map(|place| MIDDLE + spot + place.extend(0.0))
                 .collect(),
-        }
-        .swing(lab, View::orthographic([128; 2], PX_PER_MM), &cameras)
+        };
+        followed.swing(lab, View::orthographic([128; 2], PX_PER_MM), &cameras)
     })
     .known([known(ATLAS, 0.0095, why)])
 }
@@ -281,26 +271,29 @@ fn zoom(quick: bool) -> Case {
         let mut track = Track::default();
         for frame in frames {
             let px_per_mm = 0.3 * f64::powf(100.0, f64::from(frame) / f64::from(ZOOM));
-            let blur_mm2 = (2.0 / px_per_mm).powi(2);
             let form = Form::Plane {
                 along: DVec3::X,
                 down: DVec3::NEG_Y,
                 size_mm: DVec2::new(40.0, 0.625),
             };
-            let light = move |p: DVec3, _| DVec3::splat(step(p.x, blur_mm2));
-            let truth = |x_mm: f64| scattered_step(x_mm, blur_mm2, &Profile::SKIN);
-            let scene = Scene(vec![Surface::new(form, light)]);
+            let scene = Scene(vec![Surface::edge(
+                form,
+                DVec3::X,
+                0.0,
+                (2.0 / px_per_mm).powi(2),
+            )]);
             let g = scene.shoot(&View::orthographic([832, 8], px_per_mm));
-            let taps = taps(&g, places.iter().map(|x| DVec3::new(*x, 0.0, -300.0)));
-            let truths: Vec<DVec3> = taps.iter().map(|t| truth(t.point.x)).collect();
-            let frame_ = Texels::of(&g, 0.0).upload(&lab.gpu);
-            let mut results = lab.scatter(&frame_.frame(), &frame_.output)?;
+            let points = places.iter().map(|x| MIDDLE + DVec3::X * *x);
+            let taps = taps(&g, points.clone());
+            let truths: Vec<DVec3> = taps.iter().map(|t| scene.scattered(0, t.point)).collect();
+            let inputs = Texels::of(&g, 0.0).upload(&lab.gpu);
+            let mut results = lab.scatter(&inputs.frame(), &inputs.output)?;
             results.retain(|(m, _)| *m != "burley_disk");
             for (_, r) in &mut results {
                 *r = taps.iter().map(|t| r[t.pixel]).collect();
             }
             // All rows of the atlas are the same.
-            let uvs = taps.iter().map(|t| DVec2::new(t.point.x / 40.0 + 0.5, 0.5));
+            let uvs = taps.iter().map(|t| DVec2::new(scene.uv(0, t.point).x, 0.5));
             results.extend(
                 scene
                     .unwrap([512, 8])
@@ -309,89 +302,71 @@ fn zoom(quick: bool) -> Case {
             let results = results
                 .into_iter()
                 .map(|(m, r)| (m, errors(&taps, &truths, r)));
-            track.push(frame, places.iter().map(|x| truth(*x)).collect(), results);
+            track.push(
+                frame,
+                points.map(|p| scene.scattered(0, p)).collect(),
+                results,
+            );
         }
         Ok(track.outcome(Track::step, 0..places.len()))
     })
 }
 
-/// One frame of a surface, at all pixels of a crop.
-struct Still<'a> {
-    surface: Surface,
-    view: View,
-    crop: Crop,
-    /// Of its atlas.
-    texels: u32,
-    scattered: Box<dyn Fn(&Hit) -> DVec3 + 'a>,
+/// A plane with an edge of light, σ of 1 px.
+fn edge(side_mm: f64, across: DVec3, at_mm: f64) -> Surface {
+    Surface::edge(Form::facing(side_mm), across, at_mm, PX_PER_MM.powi(-2))
 }
 
-/// Values at the points of a frame.
-type Values = Vec<DVec3>;
+/// The truth in the middle of a frame, and every method's errors there.
+type Errors = (Vec<DVec3>, Vec<(&'static str, Vec<DVec3>)>);
 
-impl Still<'_> {
-    /// An edge of light with a σ of a pixel, as far from the middle; a texel is a pixel.
-    fn edge(view: View, crop: Crop, side_mm: f64, across: DVec3, moved_mm: f64) -> Self {
-        let blur_mm2 = PX_PER_MM.powi(-2);
-        let place = move |p: DVec3| p.dot(across) + moved_mm;
-        let light = move |p: DVec3, _| DVec3::splat(step(place(p), blur_mm2));
-        Self {
-            surface: Surface::new(Form::facing(side_mm), light),
-            view,
-            crop,
-            texels: (side_mm * PX_PER_MM) as u32,
-            scattered: Box::new(move |h| scattered_step(place(h.point), blur_mm2, &Profile::SKIN)),
-        }
+/// One frame of a surface, `size` pixels, of which the middle `side` are looked at.
+fn still(lab: &Lab, surface: Surface, size: u32, side: u32, texels: u32) -> Result<Errors, Error> {
+    let scene = Scene(vec![surface]);
+    let view = View::orthographic([size; 2], PX_PER_MM);
+    let g = scene.shoot(&view);
+    let pixels = Crop::middle(&view, [side; 2]).pixels(size).into_iter();
+    let pixels: Vec<(usize, Hit)> = pixels.filter_map(|i| g.hits[i].map(|h| (i, h))).collect();
+    let truth: Vec<DVec3> = pixels
+        .iter()
+        .map(|(_, h)| scene.scattered(0, h.point))
+        .collect();
+    let inputs = Texels::of(&g, 0.0).upload(&lab.gpu);
+    let mut results = lab.scatter(&inputs.frame(), &inputs.output)?;
+    for (_, r) in &mut results {
+        *r = pixels.iter().map(|(i, _)| r[*i]).collect();
     }
-
-    /// A ball of 10 mm under a light from afar, where n_z is above 0.5.
-    fn ball(sun: DVec3, brightness: f64, scattered: Box<dyn Fn(&Hit) -> DVec3 + '_>) -> Still<'_> {
-        let light = move |_, n: DVec3| DVec3::splat(brightness * n.dot(sun).max(0.0));
-        Still {
-            surface: Surface::new(Form::Sphere { rho_mm: 10.0 }, light),
-            view: View::orthographic([88; 2], PX_PER_MM),
-            crop: Crop {
-                first: [20; 2],
-                size: [48; 2],
-            },
-            texels: 160,
-            scattered,
-        }
-    }
-
-    /// The truth, and every method's errors.
-    fn errors(self, lab: &Lab) -> Result<(Values, Vec<(&'static str, Values)>), Error> {
-        let scene = Scene(vec![self.surface]);
-        let g = scene.shoot(&self.view);
-        let pixels = self.crop.pixels(self.view.size[0]).into_iter();
-        let pixels: Vec<(usize, Hit)> = pixels.filter_map(|i| g.hits[i].map(|h| (i, h))).collect();
-        let truth: Values = pixels
-            .iter()
-            .map(|(_, hit)| (self.scattered)(hit))
-            .collect();
-        let frame = Texels::of(&g, 0.0).upload(&lab.gpu);
-        let mut results = lab.scatter(&frame.frame(), &frame.output)?;
-        for (_, r) in &mut results {
-            *r = pixels.iter().map(|(i, _)| r[*i]).collect();
-        }
-        let uvs: Vec<DVec2> = pixels.iter().map(|(_, h)| scene.uv(0, h.point)).collect();
-        results.extend(scene.unwrap([self.texels; 2]).scatter(lab, &uvs)?);
-        let off = |r: Vec<glam::Vec3>| {
-            r.iter()
-                .zip(&truth)
-                .map(|(r, t)| r.as_dvec3() - t)
-                .collect()
-        };
-        let errors = results.into_iter().map(|(m, r)| (m, off(r))).collect();
-        Ok((truth, errors))
-    }
+    let uvs: Vec<DVec2> = pixels.iter().map(|(_, h)| scene.uv(0, h.point)).collect();
+    results.extend(scene.unwrap([texels; 2]).scatter(lab, &uvs)?);
+    let off = |r: Vec<Vec3>| {
+        r.iter()
+            .zip(&truth)
+            .map(|(r, t)| r.as_dvec3() - t)
+            .collect()
+    };
+    let errors = results.into_iter().map(|(m, r)| (m, off(r))).collect();
+    Ok((truth, errors))
 }
+
+/// A ball under light from afar, where n_z is above 0.5.
+fn ball(lab: &Lab, light: DVec3) -> Result<Errors, Error> {
+    still(
+        lab,
+        Surface::lit(Form::Sphere { rho_mm: 10.0 }, light),
+        88,
+        48,
+        160,
+    )
+}
+
+type Figure = fn(&Track) -> Figures;
 
 /// Cases that take their figures from one track, and show its middle row of `width` points.
 fn of_track<const N: usize>(
     make: impl Fn(&Lab) -> Result<Track, Error> + Clone + 'static,
     width: usize,
     what: &str,
-    cases: [(&str, Bound, fn(&Track) -> Figures); N],
+    cases: [(&str, Bound, Figure); N],
 ) -> [Case; N] {
     let track = Shared::new();
     cases.map(|(name, bound, figures)| {
@@ -410,13 +385,10 @@ fn turning_light(quick: bool) -> [Case; 2] {
     // The terminator crosses what is counted from 30 to 150 degrees.
     let degrees = if quick { 70..=86 } else { 0..=150 };
     let make = move |lab: &Lab| {
-        let scattered = &scattered_cosine(10.0, &Profile::SKIN);
         let mut track = Track::default();
         for degree in degrees.clone() {
             let (sin, cos) = f64::from(degree).to_radians().sin_cos();
-            let sun = DVec3::new(sin, 0.3, cos).normalize();
-            let scattered = Box::new(move |h: &Hit| scattered(h.normal.dot(sun)));
-            let (truth, errors) = Still::ball(sun, 1.0, scattered).errors(lab)?;
+            let (truth, errors) = ball(lab, DVec3::new(sin, 0.3, cos).normalize())?;
             track.push(degree, truth, errors);
         }
         Ok(track)
@@ -427,7 +399,7 @@ fn turning_light(quick: bool) -> [Case; 2] {
         the largest of all frames.";
     let why = "By less than 0.0005, in the full form alone: the pyramid's own blur does not know \
         that the ball is bent, and its taps make up for that in part. The exact sum passes.";
-    let cases: [(_, _, fn(&Track) -> Figures); 2] = [
+    let cases: [(_, _, Figure); 2] = [
         ("light turns: step", FLICKER, Track::step),
         ("light turns: error", GRADIENT, Track::worst),
     ];
@@ -445,10 +417,9 @@ fn off_and_on() -> Case {
     };
     Case::new("light switched off and on", what, bound, |lab| {
         let sun = DVec3::new(-0.6, 0.3, 0.7).normalize();
-        // Errors against nothing are the results.
-        let shown =
-            |brightness| Still::ball(sun, brightness, Box::new(|_| DVec3::ZERO)).errors(lab);
-        let [(_, lit), (_, black), (_, again)] = [shown(1.0)?, shown(0.0)?, shown(1.0)?];
+        let (_, lit) = ball(lab, sun)?;
+        let (_, black) = ball(lab, DVec3::ZERO)?;
+        let (_, again) = ball(lab, sun)?;
         let mut figures = vec![];
         for ((method, lit), ((_, black), (_, again))) in
             lit.into_iter().zip(black.iter().zip(&again))
@@ -460,7 +431,7 @@ fn off_and_on() -> Case {
                 [(method, largest(all.flat_map(|c| c.abs().to_array())))],
             );
         }
-        Ok::<Outcome, Error>(figures.into())
+        Ok(figures.into())
     })
 }
 
@@ -471,10 +442,8 @@ fn moving_shadow(quick: bool) -> [Case; 3] {
         for frame in 0..frames {
             // An eighth of a pixel a frame, so that ever more is lit.
             let moved_mm = (f64::from(frame) - f64::from(frames) / 2.0) / 8.0 / PX_PER_MM;
-            let view = View::orthographic([104; 2], PX_PER_MM);
-            let crop = Crop::middle(&view, [26; 2]);
-            let (truth, errors) =
-                Still::edge(view, crop, 26.0, direction(27.0), moved_mm).errors(lab)?;
+            let shadow = edge(26.0, direction(27.0), -moved_mm);
+            let (truth, errors) = still(lab, shadow, 104, 26, 104)?;
             track.push(frame, truth, errors);
         }
         Ok(track)
@@ -493,7 +462,7 @@ fn moving_shadow(quick: bool) -> [Case; 3] {
         degrades: FOUND,
         ..super::PROMISE
     };
-    let cases: [(_, _, fn(&Track) -> Figures); 3] = [
+    let cases: [(_, _, Figure); 3] = [
         ("shadow moves: error", error, Track::worst),
         ("shadow moves: swing", FLICKER, Track::swing),
         ("shadow moves: never darker", never, Track::fall),
