@@ -113,12 +113,12 @@ fn odd_pixels(ratio: f64, quick: bool) -> Case {
         let crop = Crop::middle(&view, (2.0 * NEAR_MM * px).as_uvec2().to_array());
         Trial::new(scene, view, crop, Truth::Closed)
     };
-    let what = "Flat skin that faces the camera, with so many pixels a mm across for each down, 3 px/mm \
-        down (1.5, 3 and 6 in full), under soft edges of light (σ of 1 px) across, down and between: \
-        largest difference to the closed form within 6 mm. An atlas is not in the frame's pixels and \
-        is left out.";
-    let why = "The blurs of the pyramid are round in pixels. Use the exact sum, or scatter before the \
-        frame is stretched.";
+    let what = "Flat skin that faces the camera, with so many pixels a mm across for each down, \
+        3 px/mm down (1.5, 3 and 6 in full), under soft edges of light (σ of 1 px) across, down \
+        and between: largest difference to the closed form within 6 mm. An atlas is not in the \
+        frame's pixels and is left out.";
+    let why = "The blurs of the pyramid are round in pixels. Use the exact sum, or scatter \
+        before the frame is stretched.";
     let scales: &[f64] = if quick { &[3.0] } else { &[3.0, 1.5, 6.0] };
     Case::new(format!("pixels {ratio} : 1"), what, PROMISE, move |lab| {
         let frames = scales

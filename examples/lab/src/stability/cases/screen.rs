@@ -21,7 +21,7 @@ const LEAK: Bound = Bound {
     passes: 0.0005,
     degrades: SEEN,
     why: "less than 0.0001 crosses 10 mm of air by the skin profile; more than 0.0005, a step of \
-          half floats, is a leak.",
+        half floats, is a leak.",
 };
 
 const COARSE: &str = "A coarse pixel of the pyramid holds one surface, so the light of the other \
@@ -125,10 +125,10 @@ fn silhouettes(quick: bool) -> Vec<Case> {
                 .before(background)
                 .atlas(texels, Truth::Closed)
         };
-        let what = "A cylinder of 8 mm radius (the rim of an ear: 0.75 mm), lit from 50 degrees to \
-            the side, before a background of light 0 or 4, 4 px/mm: largest difference to the \
-            visible integral, without the pixels at its rim, whose slopes are guesses; in texture \
-            space to the closed form.";
+        let what = "A cylinder of 8 mm radius (the rim of an ear: 0.75 mm), lit from 50 degrees \
+            to the side, before a background of light 0 or 4, 4 px/mm: largest difference to the \
+            visible integral, without the pixels at its rim, whose slopes are guesses; in \
+            texture space to the closed form.";
         let before = if background > 0.0 { "bright" } else { "black" };
         trial(format!("{part} before {before}"), what, GRADIENT, make)
     };
@@ -166,11 +166,11 @@ fn border(quick: bool) -> Vec<Case> {
                 _ => trial,
             }
         };
-        let what = "A soft edge of light (σ of 1 px) that leaves the frame at 27 degrees; or a ball \
-            of 10 mm radius whose middle lies on the border, lit at 60 degrees from outside, without \
-            its rim; 4 px/mm: largest difference within 8 mm of the border to the closed form of \
-            all of it, or to the visible integral, which ends with the frame. Texture space has no \
-            frame and is left out of the latter.";
+        let what = "A soft edge of light (σ of 1 px) that leaves the frame at 27 degrees; or a \
+            ball of 10 mm radius whose middle lies on the border, lit at 60 degrees from \
+            outside, without its rim; 4 px/mm: largest difference within 8 mm of the border to \
+            the closed form of all of it, or to the visible integral, which ends with the frame. \
+            Texture space has no frame and is left out of the latter.";
         trial(format!("{name}, against {held_to}"), what, GRADIENT, make)
     };
     let edge = || Surface::edge(Form::facing(48.0), direction(27.0), 0.0, 1.0 / 16.0);
@@ -182,8 +182,8 @@ fn border(quick: bool) -> Vec<Case> {
             .known([EXACT, PLAN].map(|method| by_nature(method, at_most, why)))
     };
     let seen = |name, surface, at_most| {
-        let why = "Beyond the frame the pyramid repeats the light at its border. Draw a frame that \
-            is 8 mm wider on all sides, or use the exact sum.";
+        let why = "Beyond the frame the pyramid repeats the light at its border. Draw a frame \
+            that is 8 mm wider on all sides, or use the exact sum.";
         case(name, "what is seen", Truth::Visible, [1; 2], surface)
             .known([known(PLAN, at_most, why)])
     };
@@ -208,10 +208,10 @@ fn slopes(quick: bool) -> Vec<Case> {
         (85.0, 0.0, [0.042, 0.088]),
         (85.0, 45.0, [0.044, 0.085]),
     ];
-    let what = "A plane tilted about a row of the picture, or (diagonal) about an axis at 45 degrees. \
-        A soft edge of light (σ of 1 px) runs across the slope, down it, and between, at 4 px/mm (2, 4 \
-        and 8 in full): largest difference to the closed form within 6 mm. Texture space does not \
-        depend on the tilt and is left out.";
+    let what = "A plane tilted about a row of the picture, or (diagonal) about an axis at 45 \
+        degrees. A soft edge of light (σ of 1 px) runs across the slope, down it, and between, \
+        at 4 px/mm (2, 4 and 8 in full): largest difference to the closed form within 6 mm. \
+        Texture space does not depend on the tilt and is left out.";
     let why = "On a steep slope taps lie further apart along its contour, and detail of a pixel \
         falls between them. Use the exact sum, or light that is soft by 2 px.";
     let case = |(tilt, axis, [at_4, at_all]): (f64, f64, [f64; 2])| {
@@ -262,8 +262,8 @@ fn slope([tilt, axis, edge]: [f64; 3], px_per_mm: f64) -> Trial {
 /// Light that falls on what the camera does not see.
 fn behind(quick: bool) -> Vec<Case> {
     let unseen = |[exact, plan]: [f64; 2]| -> [Known; 2] {
-        let why = "The frame holds no light of what it does not show. Use texture space where light \
-            comes around a rim, and add transmission by thickness where it comes through.";
+        let why = "The frame holds no light of what it does not show. Use texture space where \
+            light comes around a rim, and add transmission by thickness where it comes through.";
         [by_nature(EXACT, exact, why), by_nature(PLAN, plan, why)]
     };
     let slab = |thickness_mm: f64| {
@@ -277,8 +277,8 @@ fn behind(quick: bool) -> Vec<Case> {
             Trial::new(Scene(vec![near, far]), view, crop, Truth::Closed)
                 .atlas([64; 2], Truth::Closed)
         };
-        let what = "Two faces this far apart, the hidden one lit by 1 and the visible one not, \
-            4 px/mm: difference to what Eq. 7 as printed passes. In texture space each face has an \
+        let what = "Two faces this far apart, the hidden one lit by 1 and the visible one not, 4 \
+            px/mm: difference to what Eq. 7 as printed passes. In texture space each face has an \
             island.";
         let why = "Texture space knows the hidden face, but sums along the atlas, where the two \
             faces of an ear lie apart: light gets around a rim, not through the middle. Add \
@@ -301,10 +301,10 @@ fn behind(quick: bool) -> Vec<Case> {
             .only_where(move |hit| degrees > 90.0 || hit.normal.z > 0.5)
             .atlas(texels, Truth::Closed)
         };
-        let what = "A cylinder of 8 mm radius (the rim of an ear: 0.75 mm) or a ball of 10 mm, lit at \
-            90 degrees from the camera's direction (from the side) or 130 (from behind; the rim: 150), \
-            4 px/mm: largest difference to the closed form, from the side where it is turned by less \
-            than 60 degrees from the camera, from behind without its rim.";
+        let what = "A cylinder of 8 mm radius (the rim of an ear: 0.75 mm) or a ball of 10 mm, \
+            lit at 90 degrees from the camera's direction (from the side) or 130 (from behind; \
+            the rim: 150), 4 px/mm: largest difference to the closed form, from the side where \
+            it is turned by less than 60 degrees from the camera, from behind without its rim.";
         let from = if degrees > 90.0 {
             "from behind"
         } else {
@@ -362,9 +362,10 @@ fn scales(quick: bool) -> Vec<Case> {
             let crop = Crop::middle(&view, [24, 12]);
             Trial::new(Scene(vec![edge]), view, crop, truth).atlas([side; 2], truth)
         };
-        let what = "A soft edge of light (σ of 1 px) at 27 degrees on skin that faces the camera, so \
-            far away that the red of the profile has this σ: largest difference in the middle 24x12 \
-            pixels to the closed form, or to the visible integral where the frame cuts the kernel.";
+        let what = "A soft edge of light (σ of 1 px) at 27 degrees on skin that faces the \
+            camera, so far away that the red of the profile has this σ: largest difference in \
+            the middle 24x12 pixels to the closed form, or to the visible integral where the \
+            frame cuts the kernel.";
         trial(format!("kernel of {width_px} px"), what, PROMISE, make)
     };
     let small = |name: &str, px_per_mm: f64, is_lit: fn(DVec3) -> bool| {
@@ -375,9 +376,10 @@ fn scales(quick: bool) -> Vec<Case> {
             let crop = Crop::middle(&view, [48, 24]);
             Trial::new(scene, view, crop, Truth::Visible).atlas([96; 2], Truth::Visible)
         };
-        let what = "A lit line at 10 degrees on dark skin, 0.1 mm wide, 2 px/mm; or dark discs of 1 mm, \
-            one in 5.3 mm, on lit skin, 0.3 px/mm. Pixels hit or miss them, which is no method's error: \
-            largest difference to the visible integral of the frame as it is, itself known to 0.0026.";
+        let what = "A lit line at 10 degrees on dark skin, 0.1 mm wide, 2 px/mm; or dark discs \
+            of 1 mm, one in 5.3 mm, on lit skin, 0.3 px/mm. Pixels hit or miss them, which is no \
+            method's error: largest difference to the visible integral of the frame as it is, \
+            itself known to 0.0026.";
         trial(name, what, GRADIENT, make)
     };
     vec![

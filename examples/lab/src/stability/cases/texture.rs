@@ -6,12 +6,12 @@ use super::islands::{HALF_MM, Island, Layout, SIDE_MM, Square};
 use super::{GRADIENT, STEP, sheet, trial};
 use crate::Error;
 use crate::method;
-use crate::stability::case::{ATLAS, Bound, Case, Figures, Known, PLAN, by_nature, known};
+use crate::stability::case::{ATLAS, Bound, Case, Figures, PLAN, by_nature, known};
 use crate::stability::inputs::Texels;
 use crate::stability::lab::Lab;
 use crate::stability::scene::{Form, Scene, Surface, from_camera};
-use crate::stability::trial::{Crop, Measure, Trial, Truth, apart, merge, relative_rms, worst};
-use crate::stability::unwrapped::{Texel, Unwrapped};
+use crate::stability::trial::{Crop, Trial, Truth, apart, merge, relative_rms, worst};
+use crate::stability::unwrapped::Unwrapped;
 use crate::synthetic::{GBuffer, View};
 
 const SEAM: &str = "Passes along u and v end with the island; what lies across its seam is \
@@ -53,112 +53,79 @@ fn squares(quick: bool) -> Vec<Case> {
     let right_half = [DVec2::new(0.0, -HALF_MM), DVec2::splat(HALF_MM)];
     let strip = [DVec2::new(-HALF_MM, -1.0), DVec2::new(HALF_MM, 1.0)];
     let fine = [DVec2::X, DVec2::Y].map(|axis| axis / 20.0);
-    let case = |name: &str,
-                what: &str,
-                square: &Square,
-                layout: Layout,
-                measure: Measure,
-                known: Option<Known>| {
+    let case = |name: &str, what: &str, square: &Square, layout: Layout| {
         let square = square.clone();
-        let run = move |lab: &Lab| square.run(lab, &layout, measure);
-        Case::new(name, what, GRADIENT, run).known(known)
+        Case::new(name, what, GRADIENT, move |lab| {
+            square.run(lab, &layout, worst)
+        })
     };
-    let seam = |at_most| Some(known(ATLAS, at_most, SEAM));
+    let rms = |name: &str, layout: Layout| {
+        let what = "The edge at 27 degrees, the square in one piece, or cut into 10x10 islands \
+            of 2.8 mm that lie shuffled in the atlas. Here the figure is the root mean square of \
+            the differences over that of the truth.";
+        let square = diagonal.clone();
+        Case::new(name, what, GRADIENT, move |lab| {
+            square.run(lab, &layout, relative_rms)
+        })
+    };
+    let seam = |at_most| [known(ATLAS, at_most, SEAM)];
+    let seams = "A flat square under a soft edge of light (σ of 0.5 mm), cut into two islands \
+        that lie apart in the atlas, along the edge or at 27 degrees to it; 0.19 mm a texel \
+        (0.12 in full). In all cases of the square the figure is the largest difference in its \
+        middle 11x5.6 mm: in screen space, at 5 px/mm (8 in full), to the visible integral; in \
+        texture space, fetched bilinearly, to the closed form.";
+    let stretch = "One island, texels of 0.4 by 0.2 mm, or 0.4 by 0.05; the edge at 45 degrees with a σ of 1 mm.";
+    let shear = "Texels whose sides are at 30 degrees to each other, the edge at 27 degrees.";
+    let behind = "The square lies mirrored in the atlas, next to an island of another, 100 mm \
+        behind it and lit where this one is dark.";
+    let drawn_over = "Half of that other square is drawn onto the texels of this one, which \
+        `Atlas` asks a host not to do.";
+    let wide_texels = "The edge at 27 degrees, with texels twice as wide as it is soft.";
+    let narrow = "The atlas holds a strip across the edge, 2 mm wide; texture space is asked for that alone.";
     let overlap = "A texel has room for one point. Give each surface an atlas of its own, or use the exact sum.";
     let coarse = "Light that is finer than the texels is not in the atlas. Take 2 texels for the \
         narrowest edge of light, or use the exact sum.";
+    let strip = Layout::apart(1, vec![Island::new(strip, fine)]);
     vec![
-        case(
-            "a seam along an edge of light",
-            "A flat square under a soft edge of light (σ of 0.5 mm), cut along it into two \
-             islands that lie apart in the atlas, 0.19 mm a texel (0.12 in full). In all cases \
-             of the square the figure is the largest difference in its middle 11x5.6 mm: in \
-             screen space, at 5 px/mm (8 in full), to the visible integral; in texture space, \
-             fetched bilinearly, to the closed form.",
-            &upright,
-            halves(),
-            worst,
-            seam(0.26),
-        ),
-        case("a seam across an edge of light", "The same islands, the edge at 27 degrees.", &diagonal, halves(), worst, seam(0.22)),
+        case("a seam along an edge of light", seams, &upright, halves()).known(seam(0.26)),
+        case("a seam across an edge of light", seams, &diagonal, halves()).known(seam(0.22)),
         case(
             "stretch 1:2",
-            "One island, texels of 0.4 by 0.2 mm, or 0.4 by 0.05; the edge at 45 degrees with a σ of 1 mm.",
+            stretch,
             &wide,
             whole(0.4 * DVec2::X, 0.2 * DVec2::Y),
-            worst,
-            None,
         ),
         case(
             "stretch 1:8",
-            "One island, texels of 0.4 by 0.2 mm, or 0.4 by 0.05; the edge at 45 degrees with a σ of 1 mm.",
+            stretch,
             &wide,
             whole(0.4 * DVec2::X, 0.05 * DVec2::Y),
-            worst,
-            None,
         ),
-        case(
-            "shear by 60 degrees",
-            "Texels whose sides are at 30 degrees to each other, the edge at 27 degrees.",
-            &diagonal,
-            whole(u, sheared),
-            worst,
-            None,
-        ),
+        case("shear by 60 degrees", shear, &diagonal, whole(u, sheared)),
         case(
             "a mirrored island",
-            "The square lies mirrored in the atlas, next to an island of another, 100 mm behind it and lit where this one is dark.",
+            behind,
             &diagonal,
             Layout::apart(2, mirrored),
-            worst,
-            None,
         )
         .unpictured(),
         case(
             "islands that overlap",
-            "Half of that other square is drawn onto the texels of this one, which `Atlas` asks a host not to do.",
+            drawn_over,
             &diagonal,
             whole(u, v).drawn_over(right_half),
-            worst,
-            Some(by_nature(ATLAS, 1.05, overlap)),
-        ),
+        )
+        .known([by_nature(ATLAS, 1.05, overlap)]),
         case(
             "one texel a mm",
-            "The edge at 27 degrees, with texels twice as wide as it is soft.",
+            wide_texels,
             &diagonal,
             whole(DVec2::X, DVec2::Y),
-            worst,
-            Some(by_nature(ATLAS, 0.1, coarse)),
-        ),
-        case(
-            "twenty texels a mm",
-            "The atlas holds a strip across the edge, 2 mm wide; texture space is asked for that alone.",
-            &upright,
-            Layout::apart(1, vec![Island::new(strip, fine)]),
-            worst,
-            None,
-        ),
-        case(
-            "one island",
-            "The edge at 27 degrees, the square in one piece, or cut into 10x10 islands of 2.8 \
-             mm that lie shuffled in the atlas. Here the figure is the root mean square of the \
-             differences over that of the truth.",
-            &diagonal,
-            whole(u, v),
-            relative_rms,
-            None,
         )
-        .unpictured(),
-        case(
-            "a hundred islands",
-            "The edge at 27 degrees, the square in one piece, or cut into 10x10 islands of 2.8 \
-             mm that lie shuffled in the atlas. Here the figure is the root mean square of the \
-             differences over that of the truth.",
-            &diagonal,
-            hundred,
-            relative_rms,
-            seam(0.06),
-        ),
+        .known([by_nature(ATLAS, 0.1, coarse)]),
+        case("twenty texels a mm", narrow, &upright, strip),
+        rms("one island", whole(u, v)).unpictured(),
+        rms("a hundred islands", hundred).known(seam(0.06)),
     ]
 }
 
@@ -182,10 +149,10 @@ fn cylinder(in_view: bool, quick: bool) -> Case {
             .only_where(|hit| hit.normal.z > 0.3)
             .atlas(texels, Truth::Closed)
     };
-    let what = "A cylinder of 8 mm radius lit from 60 degrees to the side, unrolled into one island \
-        whose seam faces the camera or lies behind: largest difference where it is turned by less \
-        than 73 degrees from the camera, in screen space to the visible integral, in texture space to \
-        the closed form.";
+    let what = "A cylinder of 8 mm radius lit from 60 degrees to the side, unrolled into one \
+        island whose seam faces the camera or lies behind: largest difference where it is turned \
+        by less than 73 degrees from the camera, in screen space to the visible integral, in \
+        texture space to the closed form.";
     match in_view {
         true => trial("a cylinder's seam in view", what, GRADIENT, make)
             .known([known(ATLAS, 0.08, SEAM)]),
@@ -253,23 +220,19 @@ fn many_heads() -> Case {
     .known([known(PLAN, 0.002, why)])
 }
 
-const HEAD_MM: f64 = 8.0;
-
-/// Every head is lit from a side of its own.
-fn head_light(head: u32) -> DVec3 {
-    DVec2::from_angle(f64::from(head) * 2.4)
+/// Every head is lit from a side of its own; neighbours stand 40 mm or more behind each other.
+fn head(head: u32) -> Surface {
+    let [column, row] = [head % 3, head / 3].map(f64::from);
+    let behind_mm = -40.0 * f64::from((head % 3 + 2 * (head / 3)) % 4);
+    let light = DVec2::from_angle(f64::from(head) * 2.4)
         .extend(1.0)
-        .normalize()
+        .normalize();
+    let place = DVec3::new(17.5 * (column - 1.0), 17.5 * (row - 1.0), behind_mm);
+    Surface::lit(Form::Sphere { rho_mm: 8.0 }, light).moved(place)
 }
 
-/// The frame with these heads; neighbours stand 40 mm or more behind each other.
+/// The frame with these heads.
 fn look_at_heads(heads: impl IntoIterator<Item = u32>) -> GBuffer {
-    let head = |head: u32| {
-        let [column, row] = [head % 3, head / 3].map(f64::from);
-        let behind_mm = -40.0 * f64::from((head % 3 + 2 * (head / 3)) % 4);
-        let place = DVec3::new(17.5 * (column - 1.0), 17.5 * (row - 1.0), behind_mm);
-        Surface::lit(Form::Sphere { rho_mm: HEAD_MM }, head_light(head)).moved(place)
-    };
     let scene = Scene(heads.into_iter().map(head).collect());
     scene.shoot(&View::orthographic([158; 2], 3.0))
 }
@@ -291,7 +254,9 @@ fn heads_on_screen(lab: &Lab) -> Result<Figures, Error> {
 
 fn heads_in_atlases(lab: &Lab) -> Result<Figures, Error> {
     let gpu = &lab.gpu;
-    let heads: Vec<Unwrapped> = (0..9).map(unwrap_head).collect();
+    // Of two sizes in turn, so that scratch memory is made anew between them.
+    let unwrap = |i: u32| Scene(vec![head(i)]).unwrap([64 - i % 2 * 16; 2]);
+    let heads: Vec<Unwrapped> = (0..9).map(unwrap).collect();
     let mut figures = Vec::new();
     lab.by_atlas(|name, method| {
         let [alone, together] =
@@ -314,21 +279,4 @@ fn heads_in_atlases(lab: &Lab) -> Result<Figures, Error> {
         Ok(())
     })?;
     Ok(figures)
-}
-
-/// The half of a head that faces the camera, unrolled by its polar angle. Atlases of two sizes take turns,
-/// so that scratch memory is made anew between them.
-fn unwrap_head(head: u32) -> Unwrapped {
-    let size = if head.is_multiple_of(2) { 64 } else { 48 };
-    let texel_mm = 2.0 * HEAD_MM * 1.7 / f64::from(size);
-    Unwrapped::new([size; 2], |uv| {
-        let off = 2.2 * (uv - 0.5);
-        let (sin, cos) = (1.6 * off.length()).sin_cos();
-        let normal = (off.normalize_or(DVec2::X) * sin).extend(cos);
-        (off.length() < 1.0).then(|| Texel {
-            point_mm: normal * HEAD_MM,
-            irradiance: DVec3::splat(normal.dot(head_light(head)).max(0.0)),
-            area_mm2: texel_mm * texel_mm,
-        })
-    })
 }

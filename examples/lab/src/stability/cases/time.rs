@@ -52,12 +52,12 @@ fn pan(quick: bool) -> Vec<DAffine3> {
 /// A plane under waves of all directions.
 fn over_a_plane(tilt: f64, quick: bool) -> Case {
     let what = format!(
-        "A plane tilted by 0 or 40 degrees in perspective, lit by waves of 8 px and longer at 4 px/mm, \
-         under a camera that pans by fractions of a pixel; 2 texels a pixel. {FOLLOWED}"
+        "A plane tilted by 0 or 40 degrees in perspective, lit by waves of 8 px and longer at 4 \
+         px/mm, under a camera that pans by fractions of a pixel; 2 texels a pixel. {FOLLOWED}"
     );
-    let why = "Taps of the pyramid lie on lattices of whole pixels, each slope has one of its own, and \
-        a simple tile one for all its pixels: a point changes from one to another as tiles pass over \
-        it. Use the exact sum.";
+    let why = "Taps of the pyramid lie on lattices of whole pixels, each slope has one of its \
+        own, and a simple tile one for all its pixels: a point changes from one to another as \
+        tiles pass over it. Use the exact sum.";
     let case = Case::new(
         format!("pan over a plane at {tilt}°"),
         what,
@@ -107,8 +107,8 @@ fn over_a_plane(tilt: f64, quick: bool) -> Case {
 fn over_a_sphere(quick: bool) -> Case {
     const RINGS: usize = 24;
     let what = format!(
-        "A ball of 10 mm radius at 4 px/mm, lit from the side and by two sets of rings 10 px wide, where \
-         n_z is above 0.6; 1.5 texels a pixel. {FOLLOWED}"
+        "A ball of 10 mm radius at 4 px/mm, lit from the side and by two sets of rings 10 px \
+         wide, where n_z is above 0.6; 1.5 texels a pixel. {FOLLOWED}"
     );
     Case::new("pan over a sphere", what, FLICKER, move |lab| {
         let rho_mm = 10.0;
@@ -191,10 +191,10 @@ fn past_a_layer(quick: bool) -> Case {
 
 /// An edge along a column, and a camera that pans along it by whole pixels.
 fn by_whole_pixels() -> Case {
-    let what = "A soft edge of light (σ of 1 px) along the columns, 4 px/mm, and a camera that pans along \
-        it by whole pixels. The frame stays the same, and so do the results, while points of the surface \
-        move up through them: the most that the error at one of them swings. Noise that is drawn for each \
-        pixel of the frame does not move with the skin.";
+    let what = "A soft edge of light (σ of 1 px) along the columns, 4 px/mm, and a camera that \
+        pans along it by whole pixels. The frame stays the same, and so do the results, while \
+        points of the surface move up through them: the most that the error at one of them \
+        swings. Noise that is drawn for each pixel of the frame does not move with the skin.";
     Case::new("pan by whole pixels", what, FLICKER, |lab| {
         let border = (REACH_MM * PX_PER_MM).ceil() as u32;
         let side = 112 - 2 * border;
@@ -212,11 +212,12 @@ fn by_whole_pixels() -> Case {
 /// A spot of light, and a camera that turns about its own axis.
 fn roll(quick: bool) -> Case {
     let what = format!(
-        "A spot of light on a plane, σ of 2 px at 4 px/mm, under a camera that turns by 90 degrees about \
-         its axis; 2 texels a pixel. A kernel that is not round turns with the camera. {FOLLOWED}"
+        "A spot of light on a plane, σ of 2 px at 4 px/mm, under a camera that turns by 90 \
+         degrees about its axis; 2 texels a pixel. A kernel that is not round turns with the \
+         camera. {FOLLOWED}"
     );
-    let why = "The final pass fetches bilinearly, which flattens the tip of the spot wherever a pixel \
-        falls between texels. Use a finer atlas, or a cubic fetch.";
+    let why = "The final pass fetches bilinearly, which flattens the tip of the spot wherever a \
+        pixel falls between texels. Use a finer atlas, or a cubic fetch.";
     Case::new("camera rolls over a spot", what, FLICKER, move |lab| {
         let (spot, spot_mm2) = (DVec3::new(0.13, 0.21, 0.0), (2.0 / PX_PER_MM).powi(2));
         let light =
