@@ -1,5 +1,5 @@
-//! What a host hands over, as a case may change it: a frame, and an atlas whose texels are the pixels of that
-//! frame, so that methods of both spaces know the same.
+//! What a host hands over, as a case may change it: a frame, and an atlas whose texels are the pixels of
+//! that frame, so that methods of both spaces know the same.
 
 use glam::{DVec3, Mat4, Vec3};
 use half::f16;

@@ -68,12 +68,11 @@ impl Report<'_> {
             page += &table(&rows);
             for family in rows.chunk_by(|a, b| a.case.what == b.case.what) {
                 let names: Vec<&str> = family.iter().map(|j| j.case.name.as_str()).collect();
-                let _ = write!(
-                    page,
-                    "\n**{}.** {}\n",
-                    names.join("; "),
-                    family[0].case.what
-                );
+                let names = match names[..] {
+                    [first, _, .., last] => format!("{first} to {last}"),
+                    _ => names.join("; "),
+                };
+                page += &wrapped(&format!("**{names}.** {}", family[0].case.what));
                 for judged in family.iter().filter(|j| j.is_shown()) {
                     let (name, picture) = (&judged.case.name, picture_name(judged));
                     let _ = write!(page, "\n![{name}: truth and methods](images/{picture})\n");
@@ -149,11 +148,28 @@ fn reasons(rows: &[&Judged]) -> String {
         let names = if of_all {
             "all".into()
         } else {
-            format!("*{}*", names.join("*, *"))
+            names.join("; ")
         };
-        let _ = write!(text, "\n- {of} ({names}): {why}");
+        text += &wrapped(&format!("- {of} ({names}): {why}"));
     }
-    text + "\n"
+    text
+}
+
+/// A paragraph, in lines of less than 110 columns.
+fn wrapped(text: &str) -> String {
+    let mut lines = String::new();
+    let mut column = 0;
+    for word in text.split(' ') {
+        let length = word.chars().count() + 1;
+        column = if column + length < 110 {
+            column + length
+        } else {
+            length
+        };
+        lines += if column == length { "\n" } else { " " };
+        lines += word;
+    }
+    lines + "\n"
 }
 
 const INTRODUCTION: &str = "\
@@ -163,13 +179,15 @@ Written by
 
     cargo run --release --example stabilityOPTIONS
 
-on ADAPTER. The quick form of it runs before every
-change, and fails where a method of this crate is worse than this page says. Which plan and settings a scene
-needs, [choosing.md](choosing.md) draws from it.
+on ADAPTER.
 
-In the tables, figures in *italics* are degraded, those in **bold** fail. Irradiance is linear, and white is 1.
-\"The visible integral\" is Eq. 7 over what the camera sees, \"the closed form\" is Eq. 7 solved on paper, both
-divided by the kernel's mass. `screen_exact` is the exact sum, `screen_planned` a plan for an error of 1/255.
-Below each table: what the cases are, why the thresholds are where they are, and why a method of ours does not
-pass. In pictures the upper row shows the truth and the methods, the lower row their errors, ten times as bright.
+The quick form of it runs before every change, and fails where a method of this crate is worse than this page
+says. Which plan and settings a scene needs, [choosing.md](choosing.md) draws from it.
+
+In the tables, figures in *italics* are degraded, those in **bold** fail. Irradiance is linear, and white is
+1. \"The visible integral\" is Eq. 7 over what the camera sees, \"the closed form\" is Eq. 7 solved on paper,
+both divided by the kernel's mass. `screen_exact` is the exact sum, `screen_planned` a plan for an error of
+1/255. Below each table: what the cases are, why the thresholds are where they are, and why a method of ours
+does not pass. In pictures the upper row shows the truth and the methods, the lower row their errors, ten
+times as bright.
 ";

@@ -1,5 +1,5 @@
-//! Files that are cut short, or lie. Nothing is scattered: the reader is what is scored. Files with damage at
-//! random are tried by tests/properties.rs.
+//! Files that are cut short, or lie. Nothing is scattered: the reader is what is scored. Files with damage
+//! at random are tried by tests/properties.rs.
 
 use std::ops::Range;
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -216,8 +216,8 @@ fn containers() -> Vec<Attempt> {
         .collect()
 }
 
-/// What a reader must do; places in the JSON of [`Model`], where * stands for 0 to 3; and values for them, one
-/// at a time, of which null takes a value away.
+/// What a reader must do; places in the JSON of [`Model`], where * stands for 0 to 3; and values for them,
+/// one at a time, of which null takes a value away.
 const VALUES: &str = r#"
 refuse /accessors/*/count /accessors/*/byteOffset /bufferViews/*/byteOffset = NUMBERS
 refuse /bufferViews/*/byteLength /bufferViews/*/byteStride = NUMBERS
@@ -253,7 +253,8 @@ refuse /nodes/0/scale /nodes/0/translation = [1e39,1,1]
 refuse /nodes/0/rotation = [1e39,0,0,1]
 refuse /nodes/0/matrix = [1e39,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1] [1,0,0,0,0,1,0,0,0,0,1,0,0,0,0]
 refuse /materials/0/normalTexture/scale = 1e39
-refuse /materials/0/extras = {"PROFILE":1e39} {"PROFILE":-1} {"PROFILE":256} {"PROFILE":0.5} {"PROFILE":"skin"}
+refuse /materials/0/extras = {"PROFILE":1e39} {"PROFILE":-1} {"PROFILE":256} {"PROFILE":0.5}
+refuse /materials/0/extras = {"PROFILE":"skin"}
 take /materials/0/extras = {"PROFILE":0} {"PROFILE":255}
 take /materials/0/name = "skin" "Eye"
 take /meshes/0/primitives/0/material = null

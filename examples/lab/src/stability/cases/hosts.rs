@@ -43,7 +43,8 @@ fn apart(a: &Pixels, b: &Pixels) -> f64 {
 const SAME: Bound = Bound {
     passes: 0.0,
     degrades: STEP,
-    why: "the same work on the same device gives the same bits; any difference is left over from another frame.",
+    why: "the same work on the same device gives the same bits; any difference is left over from \
+          another frame.",
 };
 
 /// Another size every frame.
@@ -192,7 +193,8 @@ fn leaks(quick: bool) -> Case {
     let bound = Bound {
         passes: 0.25,
         degrades: 2.0,
-        why: "0.25 KiB a frame is 53 MiB in an hour at 60 Hz. A frame's settings take 2 KiB, its textures here 8 KiB each.",
+        why: "0.25 KiB a frame is 53 MiB in an hour at 60 Hz. A frame's settings take 2 KiB, its \
+              textures here 8 KiB each.",
     };
     Case::new(
         format!("{frames} frames, what they leave"),

@@ -47,7 +47,7 @@ fn at_random(place_mm: DVec2) -> bool {
 
 /// Cloth, which has the id 0, on the skin, at the same depth.
 fn masks(quick: bool) -> Vec<Case> {
-    let case = |name: &str, bound, at_most, is_skin: fn(DVec2) -> bool| {
+    let case = |name: &str, bound, [of_quick, of_full]: [f64; 2], is_skin: fn(DVec2) -> bool| {
         let run = move |lab: &Lab| {
             let side: u32 = if quick { 128 } else { 176 };
             let g = flat(side, |place| u32::from(is_skin(place)));
@@ -65,31 +65,39 @@ fn masks(quick: bool) -> Vec<Case> {
                 shown: (!quick).then(|| crop.show(side, &results, &truth)),
             })
         };
-        let what = "Flat skin that faces the camera, 4 px/mm, under a soft edge of light (σ of 1 \
-            px), and cloth (id 0) on it without a step in depth: beyond a line at right angles \
-            to the edge; on half of all pixels, at random; as a net with threads of 0.25 mm, 1 \
-            mm apart; as straps of 3 mm, 5 mm apart; with a hole of 3 mm radius around the edge; \
-            as patches of 2 mm. Largest difference to the visible integral over the skin. An \
-            atlas has no ids and is left out.";
-        let why = "Coarse pixels of the pyramid that hold little skin spread its light too far. Use the exact sum.";
-        Case::new(name, what, bound, run).known([known(PLAN, at_most, why)])
+        let what = "Flat skin that faces the camera, 4 px/mm, under a hard edge of light, and \
+            cloth (id 0) on it without a step in depth: beyond a line at right angles to the \
+            edge; on half of all pixels, at random; as a net with threads of 0.25 mm, 1 mm \
+            apart; as straps of 3 mm, 5 mm apart; around a hole of 3 mm radius on the edge; as \
+            patches of 2 mm. Largest difference to the visible integral over the skin. An atlas \
+            has no ids and is left out.";
+        let why = "Coarse pixels of the pyramid that hold little skin spread its light too far. \
+            Use the exact sum.";
+        let case = Case::new(name, what, bound, run);
+        case.known([known(PLAN, if quick { of_quick } else { of_full }, why)])
+    };
+    let threads = |p: DVec2| p.x.rem_euclid(1.0) >= 0.25 && p.y.rem_euclid(1.0) >= 0.25;
+    let straps = |p: DVec2| p.y.rem_euclid(5.0) >= 3.0;
+    let patches = |p: DVec2| {
+        let [x, y] = (p / 2.0).floor().as_ivec2().to_array();
+        (x + y).rem_euclid(2) == 0
     };
     vec![
-        case("ids meet in a line", PROMISE, 0.017, |p| p.y < 0.0),
-        case("half of the ids, at random", GRADIENT, 0.045, at_random).unpictured(),
-        case("a net of ids", GRADIENT, 0.05, |p| {
-            p.x.rem_euclid(1.0) >= 0.25 && p.y.rem_euclid(1.0) >= 0.25
-        }),
-        case("straps of ids", GRADIENT, 0.03, |p| {
-            p.y.rem_euclid(5.0) >= 3.0
+        case("ids meet in a line", PROMISE, [0.015, 0.015], |p| p.y < 0.0),
+        case(
+            "half of the ids, at random",
+            GRADIENT,
+            [0.026, 0.03],
+            at_random,
+        )
+        .unpictured(),
+        case("a net of ids", GRADIENT, [0.022, 0.025], threads),
+        case("straps of ids", GRADIENT, [0.0175, 0.02], straps).unpictured(),
+        case("a hole of ids", GRADIENT, [0.0195, 0.02], |p| {
+            p.length() < 3.0
         })
         .unpictured(),
-        case("a hole of ids", GRADIENT, 0.02, |p| p.length() < 3.0).unpictured(),
-        case("patches of ids", GRADIENT, 0.1, |p| {
-            let [x, y] = (p / 2.0).floor().as_ivec2().to_array();
-            (x + y).rem_euclid(2) == 0
-        })
-        .unpictured(),
+        case("patches of ids", GRADIENT, [0.0205, 0.025], patches).unpictured(),
     ]
 }
 
@@ -154,7 +162,8 @@ fn same_profile() -> Case {
     let what = "Flat skin under a soft edge of light, 4 px/mm, of one id; and with another id of \
         the same profile beyond a line that crosses it: largest difference of a method to \
         itself. Rivals take one profile.";
-    let why = "Light does not cross from one id to another, whatever their profiles. Give skin that belongs together one id.";
+    let why = "Light does not cross from one id to another, whatever their profiles. Give skin \
+        that belongs together one id.";
     Case::new("two ids of one profile", what, EVEN, run)
-        .known([known(EXACT, 0.1, why), known(PLAN, 0.1, why)])
+        .known([known(EXACT, 0.155, why), known(PLAN, 0.21, why)])
 }

@@ -59,7 +59,8 @@ fn constant(light: f32, side: u32) -> Case {
         1e-6 => Bound {
             passes: 0.06,
             degrades: 0.5,
-            why: "so close to 0 a step of half floats is 6 %; half of the light is 8 steps, one or more a pass.",
+            why: "so close to 0 a step of half floats is 6 %; half of the light is 8 steps, one \
+                  or more a pass.",
         },
         _ => EVEN,
     };
@@ -276,11 +277,12 @@ fn waves(size: [u32; 2]) -> GBuffer {
 
 /// Frames of one pixel, of one row, and with sides that halve to odd numbers at every level of a pyramid.
 fn small([width, height]: [u32; 2]) -> Case {
-    let what = "Flat skin under waves of light 4 mm long, 6 px/mm: largest difference to the visible \
-        integral, along the frame's last rows and columns, and at every fifth pixel of every fifth row.";
-    let why = "Taps of the pyramid have the right width only together. At the frame's border some are \
-        missing, in a frame a pixel wide all but the middle ones, and coarse levels are extrapolated \
-        from the last two pixels. Use the exact sum, or draw a wider frame.";
+    let what = "Flat skin under waves of light 4 mm long, 6 px/mm: largest difference to the \
+        visible integral, along the frame's last rows and columns, and at every fifth pixel of \
+        every fifth row.";
+    let why = "Taps of the pyramid have the right width only together. At the frame's border \
+        some are missing, in a frame a pixel wide all but the middle ones, and coarse levels are \
+        extrapolated from the last two pixels. Use the exact sum, or draw a wider frame.";
     let at_most = if width.min(height) == 1 { 0.025 } else { 0.022 };
     let case = Case::new(format!("{width}x{height}"), what, GRADIENT, move |lab| {
         let g = waves([width, height]);
@@ -398,6 +400,13 @@ fn width((name, sigma_mm): (&str, f32), side: u32) -> Case {
         integral, which is the mean of all light in the frame, by a plan for an error of 0.01. \
         Rivals have their kernels fitted to it; none can be to no width, and `jimenez_2009` is \
         made for skin alone.";
+    let why = if narrow {
+        "No plan keeps 1/255 for a single Gaussian, and one for 0.01 may blur by half of that. \
+         Use the exact sum."
+    } else {
+        "The kernel is wider than the coarsest level of the pyramid; `Plan::useful_px_per_mm` \
+         says to what scale a plan is good. Use the exact sum."
+    };
     let bound = if narrow { EVEN } else { GRADIENT };
     Case::new(format!("a profile of {name}"), what, bound, move |lab| {
         let profile = Profile::new(&[Gaussian {
@@ -432,6 +441,7 @@ fn width((name, sigma_mm): (&str, f32), side: u32) -> Case {
         };
         Ok(worst(&results, &asked.into_iter().zip(truth).collect()).into())
     })
+    .known((sigma_mm > 0.0).then(|| known(PLAN, if narrow { 0.005 } else { 0.05 }, why)))
 }
 
 /// The same scene in other units.

@@ -10,8 +10,8 @@ use crate::stability::case::{Bound, Case, PLAN, known};
 use crate::stability::lab::Lab;
 use crate::stability::trial::largest;
 
-/// The most that a plan may differ by from the exact sum, in units of white: at the worst crease of the head,
-/// the line of the lips, coarse pixels hold light from both sides.
+/// The most that a plan may differ by from the exact sum, in units of white: at the worst crease of the
+/// head, the line of the lips, coarse pixels hold light from both sides.
 pub const WORST_CREASE: f64 = 0.3;
 
 /// One view of the built-in head.
@@ -111,14 +111,15 @@ pub(super) fn cases(quick: bool) -> Vec<Case> {
     let bound = Bound {
         passes: WORST_CREASE,
         degrades: WORST_CREASE,
-        why: "at the line of the lips, the worst crease of the head, coarse pixels hold light from both sides.",
+        why: "at the line of the lips, the worst crease of the head, coarse pixels hold light \
+              from both sides.",
     };
     let what = "The built-in head in frames of 256 to 1920 pixels, many not multiples of 8 \
         (other widths from 611 to 1024), by plans for errors of 1/100 and 1/255 and profiles as \
         wide as skin, 0.4 and 2.5 times: largest difference to the exact sum at any pixel. The \
         quick form is tests/sweep.rs.";
     let sweeps = if quick { vec![] } else { sweeps(false) };
-    let why = "One pixel on the line of the lips at 1920x1920. Use the exact sum for stills of that size.";
+    let why = "One pixel on the line of the lips at 1920x1920. Use the exact sum for stills.";
     let case = |sweep: Sweep| {
         let name = format!("{:?}, {} times as wide", sweep.view, sweep.widening);
         let run = move |lab: &Lab| Ok(vec![(PLAN, sweep.worst(&lab.gpu)?)].into());

@@ -74,15 +74,18 @@ fn squares(quick: bool) -> Vec<Case> {
         (0.12 in full). In all cases of the square the figure is the largest difference in its \
         middle 11x5.6 mm: in screen space, at 5 px/mm (8 in full), to the visible integral; in \
         texture space, fetched bilinearly, to the closed form.";
-    let stretch = "One island, texels of 0.4 by 0.2 mm, or 0.4 by 0.05; the edge at 45 degrees with a σ of 1 mm.";
+    let stretch = "One island, texels of 0.4 by 0.2 mm, or 0.4 by 0.05; the edge at 45 degrees \
+        with a σ of 1 mm.";
     let shear = "Texels whose sides are at 30 degrees to each other, the edge at 27 degrees.";
     let behind = "The square lies mirrored in the atlas, next to an island of another, 100 mm \
         behind it and lit where this one is dark.";
     let drawn_over = "Half of that other square is drawn onto the texels of this one, which \
         `Atlas` asks a host not to do.";
     let wide_texels = "The edge at 27 degrees, with texels twice as wide as it is soft.";
-    let narrow = "The atlas holds a strip across the edge, 2 mm wide; texture space is asked for that alone.";
-    let overlap = "A texel has room for one point. Give each surface an atlas of its own, or use the exact sum.";
+    let narrow = "The atlas holds a strip across the edge, 2 mm wide; texture space is asked for \
+        that alone.";
+    let overlap = "A texel has room for one point. Give each surface an atlas of its own, or use \
+        the exact sum.";
     let coarse = "Light that is finer than the texels is not in the atlas. Take 2 texels for the \
         narrowest edge of light, or use the exact sum.";
     let strip = Layout::apart(1, vec![Island::new(strip, fine)]);
@@ -171,7 +174,8 @@ fn sheets() -> [Case; 2] {
     // Left and right halves on the same texels, as a face that is painted once.
     const MIRRORED: [sheet::Uvs; 1] =
         [|at| sheet::INSIDE(Vec2::new((2.0 * at.x - 1.0).abs(), at.y))];
-    let why = "Each half has a page of its own, and where they meet is a seam. Give each half UVs of its own, or use the exact sum.";
+    let why = "Each half has a page of its own, and where they meet is a seam. Give each half \
+        UVs of its own, or use the exact sum.";
     [
         Case::new(
             "UVs outside of 0 to 1",

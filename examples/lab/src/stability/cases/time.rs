@@ -350,15 +350,11 @@ fn still(lab: &Lab, surface: Surface, size: u32, side: u32, texels: u32) -> Resu
 }
 
 /// A ball under light from afar, where n_z is above 0.5.
-fn ball(lab: &Lab, light: DVec3) -> Result<Errors, Error> {
-    still(
-        lab,
-        Surface::lit(Form::Sphere { rho_mm: 10.0 }, light),
-        88,
-        48,
-        160,
-    )
+fn lit_ball(lab: &Lab, light: DVec3) -> Result<Errors, Error> {
+    still(lab, Surface::lit(BALL, light), 88, 48, 160)
 }
+
+const BALL: Form = Form::Sphere { rho_mm: 10.0 };
 
 type Figure = fn(&Track) -> Figures;
 
@@ -389,7 +385,7 @@ fn turning_light(quick: bool) -> [Case; 2] {
         let mut track = Track::default();
         for degree in degrees.clone() {
             let (sin, cos) = f64::from(degree).to_radians().sin_cos();
-            let (truth, errors) = ball(lab, DVec3::new(sin, 0.3, cos).normalize())?;
+            let (truth, errors) = lit_ball(lab, DVec3::new(sin, 0.3, cos).normalize())?;
             track.push(degree, truth, errors);
         }
         Ok(track)
@@ -418,9 +414,9 @@ fn off_and_on() -> Case {
     };
     Case::new("light switched off and on", what, bound, |lab| {
         let sun = DVec3::new(-0.6, 0.3, 0.7).normalize();
-        let (_, lit) = ball(lab, sun)?;
-        let (_, black) = ball(lab, DVec3::ZERO)?;
-        let (_, again) = ball(lab, sun)?;
+        let (_, lit) = lit_ball(lab, sun)?;
+        let (_, black) = still(lab, Surface::even(BALL, 0.0), 88, 48, 160)?;
+        let (_, again) = lit_ball(lab, sun)?;
         let mut figures = vec![];
         for ((method, lit), ((_, black), (_, again))) in
             lit.into_iter().zip(black.iter().zip(&again))
@@ -457,7 +453,8 @@ fn moving_shadow(quick: bool) -> [Case; 3] {
     let never = Bound {
         passes: 1.0 / 2048.0,
         degrades: STEP,
-        why: "half floats have steps of 0.0005 below white, so that a result may fall by one where it hardly moves.",
+        why: "half floats have steps of 0.0005 below white, so that a result may fall by one \
+              where it hardly moves.",
     };
     let error = Bound {
         degrades: FOUND,
