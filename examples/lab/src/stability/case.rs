@@ -137,10 +137,12 @@ impl Case {
         self
     }
 
-    /// Without a picture: it would show the same as others do.
-    pub fn unpictured(mut self) -> Self {
-        self.is_pictured = false;
-        self
+    /// Whether it has a picture; not where that would show the same as others do.
+    pub fn pictured(self, is_pictured: bool) -> Self {
+        Self {
+            is_pictured,
+            ..self
+        }
     }
 
     pub fn title(&self) -> String {

@@ -18,9 +18,7 @@ mod trial;
 mod unwrapped;
 
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
-
-use indicatif::{ProgressBar, ProgressStyle};
+use std::time::Instant;
 
 use crate::Error;
 use case::{Case, GROUPS, Judged};
@@ -52,19 +50,12 @@ fn atlas(options: &Options) -> Result<Vec<String>, Error> {
         return Err(Error::new("--only", got, "a part of a case's name"));
     }
     let lab = Lab::new()?;
-    let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {msg}");
-    let bar = ProgressBar::new(cases.len() as u64);
-    bar.set_style(style.expect("the template is a constant"));
-    bar.enable_steady_tick(Duration::from_millis(200));
+    let count = cases.len();
     let mut judged: Vec<Judged> = Vec::new();
     for case in cases {
-        bar.set_message(case.title());
-        let judgement = judge(case, &lab)?;
-        bar.suspend(|| println!("{judgement}"));
-        bar.inc(1);
-        judged.push(judgement);
+        judged.push(judge(case, &lab)?);
+        println!("{}/{count} {}", judged.len(), judged[judged.len() - 1]);
     }
-    bar.finish_and_clear();
     judged.sort_by_key(|j| GROUPS.iter().position(|group| *group == j.case.group));
     let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
     let report = Report {

@@ -90,14 +90,14 @@ fn masks(quick: bool) -> Vec<Case> {
             [0.026, 0.03],
             at_random,
         )
-        .unpictured(),
+        .pictured(false),
         case("a net of ids", GRADIENT, [0.022, 0.025], threads),
-        case("straps of ids", GRADIENT, [0.0175, 0.02], straps).unpictured(),
+        case("straps of ids", GRADIENT, [0.0175, 0.02], straps).pictured(false),
         case("a hole of ids", GRADIENT, [0.0195, 0.02], |p| {
             p.length() < 3.0
         })
-        .unpictured(),
-        case("patches of ids", GRADIENT, [0.0205, 0.025], patches).unpictured(),
+        .pictured(false),
+        case("patches of ids", GRADIENT, [0.0205, 0.025], patches).pictured(false),
     ]
 }
 
@@ -135,7 +135,7 @@ fn odd_pixels(ratio: f64, quick: bool) -> Case {
         worst_of(frames.map(|(scale, edge)| frame(scale, edge).run(lab)))
     })
     .known([known(PLAN, 0.022, why)])
-    .unpictured()
+    .pictured(false)
 }
 
 /// A face and a neck of two ids and one profile.

@@ -168,11 +168,11 @@ fn lost_light(side: u32) -> Vec<Case> {
         ("infinity", f32::INFINITY),
         ("minus infinity", f32::NEG_INFINITY),
     ];
-    let lost = values.map(|(name, value)| case(name, value, "pixels lost", few, lost).unpictured());
+    let lost =
+        values.map(|(name, value)| case(name, value, "pixels lost", few, lost).pictured(false));
     // Infinity looks as NaN does.
-    let changes = values.map(|(name, value)| match value.is_nan() {
-        true => case(name, value, "what changes", EVEN, worst),
-        false => case(name, value, "what changes", EVEN, worst).unpictured(),
+    let changes = values.map(|(name, value)| {
+        case(name, value, "what changes", EVEN, worst).pictured(value.is_nan())
     });
     lost.into_iter().chain(changes).collect()
 }
@@ -213,31 +213,24 @@ fn depths(side: u32) -> [Case; 5] {
             let view = View::perspective([side; 2], 0.0625 * f64::from(side));
             let g = view.shoot(plane(DVec3::Z, 300.0, |_| DVec3::ONE));
             let mut texels = Texels::of(&g, 0.0);
-            let bad: Vec<usize> = (0..side)
-                .map(|x| 70 * side + x)
-                .chain([40 * side + 40])
-                .map(|i| i as usize)
-                .collect();
+            let bad = (70 * side..71 * side).chain([40 * side + 40]);
+            let bad: Vec<usize> = bad.map(|i| i as usize).collect();
             for &i in &bad {
                 texels.light(i, 0.0);
                 texels.depth[i] = value;
                 let at = DVec2::new(i as f64 % f64::from(side), (i as u32 / side).into());
                 let distance_mm = view.projection.w_axis.z / f64::from(value);
                 let position = (view.ray(at + 0.5).1 * distance_mm).as_vec3().extend(1.0);
-                texels.positions_mm[i] = if value == 0.0 {
-                    [0.0; 4]
-                } else {
-                    position.to_array()
-                };
-            }
-            let light = |i| {
-                if bad.contains(&i) {
-                    DVec3::ZERO
-                } else {
-                    DVec3::ONE
+                texels.positions_mm[i] = position.to_array();
+                if value == 0.0 {
+                    texels.positions_mm[i] = [0.0; 4];
                 }
-            };
-            let truth: Known = texels.skin().into_iter().map(|i| (i, light(i))).collect();
+            }
+            let mut truth = all_are(texels.skin(), 1.0);
+            truth
+                .iter_mut()
+                .filter(|(i, _)| bad.contains(i))
+                .for_each(|(_, e)| *e = DVec3::ZERO);
             let inputs = texels.upload(&lab.gpu);
             let mut results = lab.scatter(&inputs.frame(), &inputs.output)?;
             let mut figures = worst(&results, &truth);
@@ -255,15 +248,10 @@ fn depths(side: u32) -> [Case; 5] {
             let shown = Some(crop.show(side, &results, &truth));
             Ok(Outcome { figures, shown })
         });
-        let case = match value.is_nan() {
-            true => case.known([known(ATLAS, f64::INFINITY, why)]),
-            false => case,
-        };
         // Infinity looks as NaN does, and -1 as 1.
-        match value == f32::INFINITY || value == -1.0 {
-            true => case.unpictured(),
-            false => case,
-        }
+        let looks_alike = value == f32::INFINITY || value == -1.0;
+        case.known(value.is_nan().then(|| known(ATLAS, f64::INFINITY, why)))
+            .pictured(!looks_alike)
     })
 }
 

@@ -53,9 +53,9 @@ fn layers(quick: bool) -> Vec<Case> {
     let known = |plan, atlas| [known(PLAN, plan, COARSE), known(ATLAS, atlas, ISLANDS)];
     vec![
         case(1.0).known(known(0.055, 0.35)),
-        case(2.0).known(known(0.075, 0.22)).unpictured(),
+        case(2.0).known(known(0.075, 0.22)).pictured(false),
         case(5.0).known(known(FOUND, 0.025)),
-        case(10.0).unpictured(),
+        case(10.0).pictured(false),
         case(20.0),
     ]
 }
@@ -139,9 +139,9 @@ fn silhouettes(quick: bool) -> Vec<Case> {
     let rim = |light| case("the rim of an ear", 0.75, [40, 160], [32, 24], light).known(thin);
     vec![
         finger(0.0),
-        finger(4.0).unpictured(),
+        finger(4.0).pictured(false),
         rim(0.0),
-        rim(4.0).unpictured(),
+        rim(4.0).pictured(false),
     ]
 }
 
@@ -226,10 +226,7 @@ fn slopes(quick: bool) -> Vec<Case> {
             worst_of(frames.map(|(scale, edge)| slope([tilt, axis, edge], scale).run(lab)))
         });
         let case = case.known([known(PLAN, if quick { at_4 } else { at_all }, why)]);
-        match (tilt, axis) {
-            (60.0, 45.0) | (85.0, 0.0) => case,
-            _ => case.unpictured(),
-        }
+        case.pictured([(60.0, 45.0), (85.0, 0.0)].contains(&(tilt, axis)))
     };
     slopes.map(case).into()
 }
@@ -333,7 +330,7 @@ fn behind(quick: bool) -> Vec<Case> {
     };
     vec![
         slab(1.5),
-        slab(4.0).unpictured(),
+        slab(4.0).pictured(false),
         rim.known(unseen([0.17; 2])),
         finger(90.0),
         finger(130.0).known(unseen([0.018, FOUND])),
@@ -387,7 +384,7 @@ fn scales(quick: bool) -> Vec<Case> {
         kernel(0.5),
         kernel(2.0),
         kernel(10.0),
-        kernel(50.0).unpictured(),
+        kernel(50.0).pictured(false),
         kernel(200.0),
         small("a line of light 0.1 mm wide", 2.0, |p| {
             p.dot(direction(100.0)).abs() < 0.05

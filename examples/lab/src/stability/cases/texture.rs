@@ -111,7 +111,7 @@ fn squares(quick: bool) -> Vec<Case> {
             &diagonal,
             Layout::apart(2, mirrored),
         )
-        .unpictured(),
+        .pictured(false),
         case(
             "islands that overlap",
             drawn_over,
@@ -127,7 +127,7 @@ fn squares(quick: bool) -> Vec<Case> {
         )
         .known([by_nature(ATLAS, 0.1, coarse)]),
         case("twenty texels a mm", narrow, &upright, strip),
-        rms("one island", whole(u, v)).unpictured(),
+        rms("one island", whole(u, v)).pictured(false),
         rms("a hundred islands", hundred).known(seam(0.06)),
     ]
 }
@@ -156,11 +156,9 @@ fn cylinder(in_view: bool, quick: bool) -> Case {
         island whose seam faces the camera or lies behind: largest difference where it is turned \
         by less than 73 degrees from the camera, in screen space to the visible integral, in \
         texture space to the closed form.";
-    match in_view {
-        true => trial("a cylinder's seam in view", what, GRADIENT, make)
-            .known([known(ATLAS, 0.08, SEAM)]),
-        false => trial("a cylinder's seam behind", what, GRADIENT, make),
-    }
+    let seam = if in_view { "in view" } else { "behind" };
+    trial(format!("a cylinder's seam {seam}"), what, GRADIENT, make)
+        .known(in_view.then(|| known(ATLAS, 0.08, SEAM)))
 }
 
 /// UVs as an artist may have left them.
@@ -186,7 +184,7 @@ fn sheets() -> [Case; 2] {
             GRADIENT,
             |lab| sheet::run(lab, &OUTSIDE),
         )
-        .unpictured(),
+        .pictured(false),
         Case::new(
             "mirrored halves in one place",
             "The same sheet, both halves of which have the same UVs; the renderer draws each \

@@ -25,7 +25,7 @@ const MIDDLE: DVec3 = DVec3::new(0.0, 0.0, -300.0);
 pub fn cases(quick: bool) -> Vec<Case> {
     let mut cases = vec![
         // Seen from ahead it looks as at 40 degrees.
-        over_a_plane(0.0, quick).unpictured(),
+        over_a_plane(0.0, quick).pictured(false),
         over_a_plane(40.0, quick),
         over_a_sphere(quick),
         past_a_layer(quick),
@@ -467,5 +467,5 @@ fn moving_shadow(quick: bool) -> [Case; 3] {
     ];
     let [error, swing, never] = of_track(make, 26, what, cases);
     // The picture of the error shows it.
-    [error, swing.unpictured(), never]
+    [error, swing.pictured(false), never]
 }
