@@ -1,116 +1,75 @@
 //! A flat square of skin under a soft edge of light, laid out in an atlas one way or another.
 
-use std::cell::OnceCell;
-use std::rc::Rc;
+use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2};
 
+use super::Shared;
 use crate::Error;
-use glam::{DAffine2, DMat2, DVec2, DVec3, UVec2, Vec3};
-use subsurface::Profile;
-
-use super::super::{Crop, Results};
-use crate::stability::case::{Outcome, Run, Shown};
-use crate::stability::frame::Texels;
+use crate::stability::case::Outcome;
 use crate::stability::lab::Lab;
+use crate::stability::scene::{Form, Scene, Surface};
+use crate::stability::trial::{Crop, Look, Measure, Trial, Truth};
 use crate::stability::unwrapped::{Texel, Unwrapped};
-use crate::synthetic::{Hit, View};
-use crate::truth::closed_form::{scattered_step, step};
+use crate::synthetic::View;
+use crate::truth::closed_form::step;
 
 /// Side of the square.
 pub const SIDE_MM: f64 = 28.0;
 pub const HALF_MM: f64 = SIDE_MM / 2.0;
 /// Side of the part in the middle that is asked for: what is cut off of the widest Gaussian there
-/// weighs less than .0002.
+/// weighs less than 0.0002.
 const ASKED_MM: f64 = 11.2;
 /// Between an island and the border of its place, in texels: more than results are dilated by.
 const GUTTER: f64 = 6.0;
 
-/// What a method is off by, from the truth at each place.
-pub type Measure = fn(&Results, &[(usize, DVec3)]) -> Vec<(&'static str, f64)>;
-
-/// The square, and what a camera that faces it makes of it: the same for every atlas.
+/// The square, and what a camera that faces it sees: the same for every atlas.
+#[derive(Clone)]
 pub struct Square {
-    size: [u32; 2],
-    px_per_mm: f64,
+    quick: bool,
     /// Across the edge, from dark to light.
     across: DVec2,
     /// σ of the edge.
     soft_mm: f64,
-    seen: OnceCell<Seen>,
-}
-
-/// The pixels that are asked for, row by row.
-struct Seen {
-    side: u32,
-    on_square: Vec<DVec2>,
-    screen: Results,
-    /// Of what the camera sees.
-    visible: Vec<(usize, DVec3)>,
-    /// Of a square without end.
-    whole: Vec<(usize, DVec3)>,
+    look: Shared<Look>,
 }
 
 impl Square {
     /// The edge's normal is at `degrees` from x.
-    pub fn new(degrees: f64, soft_mm: f64, quick: bool) -> Rc<Self> {
-        let (pixels, px_per_mm) = if quick { (128, 5.0) } else { (224, 8.0) };
-        Rc::new(Self {
-            size: [pixels; 2],
-            px_per_mm,
+    pub fn new(degrees: f64, soft_mm: f64, quick: bool) -> Self {
+        Self {
+            quick,
             across: DVec2::from_angle(degrees.to_radians()),
             soft_mm,
-            seen: OnceCell::new(),
-        })
-    }
-
-    /// Irradiance on the square, or on the one behind it, which is lit where this one is not.
-    fn light(&self, on_square: DVec2, is_behind: bool) -> f64 {
-        let lit = step(on_square.dot(self.across), self.soft_mm.powi(2));
-        if is_behind { 1.0 - lit } else { lit }
-    }
-
-    fn seen(&self, lab: &Lab) -> Result<&Seen, Error> {
-        match self.seen.get() {
-            Some(seen) => Ok(seen),
-            None => {
-                let seen = self.look(lab)?;
-                Ok(self.seen.get_or_init(|| seen))
-            }
+            look: Shared::new(),
         }
     }
 
-    fn look(&self, lab: &Lab) -> Result<Seen, Error> {
-        let g = View::orthographic(self.size, self.px_per_mm).shoot(|origin, _| {
-            Some(Hit {
-                point: origin.truncate().extend(-300.0),
-                normal: DVec3::Z,
-                irradiance: DVec3::splat(self.light(origin.truncate(), false)),
-                id: 1,
-            })
-        });
-        let side = (ASKED_MM * self.px_per_mm) as u32;
-        let crop = Crop {
-            first: self.size.map(|s| (s - side) / 2),
-            size: [side; 2],
-        };
-        let asked = crop.pixels(self.size[0]);
-        let frame = Texels::of(&g, DVec3::ZERO).upload(&lab.gpu);
-        let screen = lab.scatter(&frame.inputs(), &frame.output)?.into_iter();
-        let cut = |pixels: Vec<Vec3>| asked.iter().map(|i| pixels[*i]).collect();
-        let on_square: Vec<DVec2> = asked
-            .iter()
-            .filter_map(|i| g.hits[*i].map(|h| h.point.truncate()))
-            .collect();
-        let visible = g.visible_integral(&asked, &Profile::SKIN);
-        let whole = on_square
-            .iter()
-            .map(|p| scattered_step(p.dot(self.across), self.soft_mm.powi(2), &Profile::SKIN));
-        Ok(Seen {
-            side,
-            screen: screen.map(|(m, pixels)| (m, cut(pixels))).collect(),
-            visible: visible.into_iter().enumerate().collect(),
-            whole: whole.enumerate().collect(),
-            on_square,
-        })
+    /// Irradiance on the square, or on the one behind it, which is lit where this one is not.
+    fn light(&self, on_square: DVec2, is_behind: bool) -> DVec3 {
+        let lit = step(on_square.dot(self.across), self.soft_mm.powi(2));
+        DVec3::splat(if is_behind { 1.0 - lit } else { lit })
+    }
+
+    fn trial(&self) -> Trial {
+        let (pixels, px_per_mm) = if self.quick { (128, 5.0) } else { (224, 8.0) };
+        let view = View::orthographic([pixels; 2], px_per_mm);
+        let across = self.across.extend(0.0);
+        let square = Surface::edge(Form::facing(SIDE_MM), across, 0.0, self.soft_mm.powi(2));
+        let side = (ASKED_MM * px_per_mm) as u32;
+        // Half as high as wide is enough to see.
+        let crop = Crop::middle(&view, [side, side / 2]);
+        Trial::new(Scene(vec![square]), view, crop, Truth::Visible)
+    }
+
+    /// Every method on it; in texture space laid out like this, and held to the square without end.
+    ///
+    /// # Errors
+    /// Inputs that a method refuses.
+    pub fn run(&self, lab: &Lab, layout: &Layout, measure: Measure) -> Result<Outcome, Error> {
+        let trial = self.trial();
+        let look = self.look.get(|| trial.look(lab))?;
+        let truth = look.held_to(Truth::Closed, &trial.scene, None);
+        let uv = |_, point: DVec3| layout.uv(point.truncate());
+        look.textured(lab, &layout.unwrap(self), uv, &truth, measure)
     }
 }
 
@@ -213,7 +172,7 @@ impl Layout {
                 let on_square = island.to_texels.inverse().transform_point2(uv * size);
                 island.holds(on_square).then(|| Texel {
                     point_mm: on_square.extend(if island.is_behind { -100.0 } else { 0.0 }),
-                    irradiance: DVec3::splat(square.light(on_square, island.is_behind)),
+                    irradiance: square.light(on_square, island.is_behind),
                     area_mm2: island.texel_mm2(),
                 })
             })
@@ -227,36 +186,4 @@ impl Layout {
         let texel = island.to_texels.transform_point2(on_square);
         Some(texel / UVec2::from(self.size).as_dvec2())
     }
-}
-
-/// Every method on a square; in texture space laid out like this, and held to the square without end.
-pub fn run(square: &Rc<Square>, layout: Layout, measure: Measure) -> Run {
-    let square = square.clone();
-    Box::new(move |lab| {
-        let seen = square.seen(lab)?;
-        let uvs: Vec<(usize, DVec2)> = seen
-            .on_square
-            .iter()
-            .enumerate()
-            .filter_map(|(i, p)| layout.uv(*p).map(|uv| (i, uv)))
-            .collect();
-        let in_atlas: Vec<DVec2> = uvs.iter().map(|(_, uv)| *uv).collect();
-        let texture = layout.unwrap(&square).scatter(lab, &in_atlas)?;
-        let whole = uvs.iter().map(|(i, _)| seen.whole[*i].1);
-        let whole: Vec<_> = whole.enumerate().collect();
-        let mut figures = measure(&seen.screen, &seen.visible);
-        figures.extend(measure(&texture, &whole));
-        // The middle half is enough to see.
-        let side = seen.side as usize;
-        let middle = |values: &[Vec3]| values[side / 4 * side..3 * side / 4 * side].to_vec();
-        let is_whole = uvs.len() == seen.on_square.len();
-        let results = seen.screen.iter().chain(&texture);
-        let truth: Vec<Vec3> = seen.whole.iter().map(|(_, t)| t.as_vec3()).collect();
-        let shown = is_whole.then(|| Shown {
-            size: [seen.side, 3 * seen.side / 4 - seen.side / 4],
-            truth: middle(&truth),
-            results: results.map(|(m, values)| (*m, middle(values))).collect(),
-        });
-        Ok(Outcome { figures, shown })
-    })
 }

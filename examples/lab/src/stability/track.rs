@@ -1,10 +1,14 @@
 //! What becomes of points of a surface from frame to frame.
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DAffine3, DVec2, DVec3, Vec3};
 
-use super::super::largest;
-use crate::stability::case::Shown;
-use crate::synthetic::{GBuffer, View};
+use crate::Error;
+use crate::stability::case::{Figures, Outcome, Shown};
+use crate::stability::inputs::Texels;
+use crate::stability::lab::Lab;
+use crate::stability::scene::Scene;
+use crate::stability::trial::largest;
+use crate::synthetic::{GBuffer, Hit, View};
 
 /// Errors at the same points in each frame of a sequence.
 #[derive(Default)]
@@ -35,7 +39,7 @@ impl Track {
     }
 
     /// The largest error of all.
-    pub fn worst(&self) -> Vec<(&'static str, f64)> {
+    pub fn worst(&self) -> Figures {
         self.figures(|frames| {
             let errors = frames.iter().flatten();
             largest(errors.flat_map(|e| e.abs().to_array()))
@@ -43,7 +47,7 @@ impl Track {
     }
 
     /// The most that an error at a point swings over all frames, from peak to peak.
-    pub fn swing(&self) -> Vec<(&'static str, f64)> {
+    pub fn swing(&self) -> Figures {
         self.figures(|frames| {
             let swing = |point: usize, channel: usize| {
                 let errors = frames.iter().map(|f| f[point][channel]);
@@ -55,7 +59,7 @@ impl Track {
     }
 
     /// The most that an error at a point changes by from one frame to the next.
-    pub fn step(&self) -> Vec<(&'static str, f64)> {
+    pub fn step(&self) -> Figures {
         self.figures(|frames| {
             let steps = self.neighbours().flat_map(|i| {
                 let pairs = frames[i].iter().zip(&frames[i + 1]);
@@ -66,7 +70,7 @@ impl Track {
     }
 
     /// The most that a result at a point falls by from one frame to the next; 0 where it never does.
-    pub fn fall(&self) -> Vec<(&'static str, f64)> {
+    pub fn fall(&self) -> Figures {
         self.figures(|frames| {
             let result =
                 |frame: usize, point: usize| self.truth[frame][point] + frames[frame][point];
@@ -78,8 +82,20 @@ impl Track {
         })
     }
 
+    /// A figure of it, and a picture of `points`.
+    pub fn outcome(
+        &self,
+        figures: fn(&Self) -> Figures,
+        points: std::ops::Range<usize>,
+    ) -> Outcome {
+        Outcome {
+            figures: figures(self),
+            shown: Some(self.show(points)),
+        }
+    }
+
     /// A picture of `points`, side by side, a frame a row from the first on.
-    pub fn show(&self, points: std::ops::Range<usize>) -> Shown {
+    fn show(&self, points: std::ops::Range<usize>) -> Shown {
         // No more rows than a small picture has room for.
         let frames = || (0..self.frames.len()).step_by(self.frames.len().div_ceil(12));
         let places = || frames().flat_map(|f| points.clone().map(move |p| (f, p)));
@@ -101,7 +117,7 @@ impl Track {
             .map(|i| i - 1)
     }
 
-    fn figures(&self, of: impl Fn(&[Vec<DVec3>]) -> f64) -> Vec<(&'static str, f64)> {
+    fn figures(&self, of: impl Fn(&[Vec<DVec3>]) -> f64) -> Figures {
         let methods = self.errors.iter();
         methods
             .map(|(method, frames)| (*method, of(frames)))
@@ -162,6 +178,82 @@ pub fn errors(
 ) -> Vec<DVec3> {
     let pairs = results.into_iter().zip(truths);
     read(taps, pairs.map(|(r, truth)| r.as_dvec3() - truth))
+}
+
+/// One surface that stands still, and points of it that are followed through the picture.
+pub struct Followed {
+    pub scene: Scene,
+    /// Of its atlas.
+    pub texels: [u32; 2],
+    pub points: Vec<DVec3>,
+}
+
+/// What [`Followed::swing`] measures, for a case's text.
+pub const FOLLOWED: &str = "Points of the surface are followed and read by Catmull-Rom; the \
+    figure is the most that the error at one of them, against the closed form, swings from peak \
+    to peak. Texture space scatters once. In the picture a frame is a row.";
+
+/// Points that are followed: rows and columns of a grid, the middle of which is shown.
+const GRID: [usize; 2] = [9, 32];
+
+/// Places up to `half_mm` from a middle, row by row.
+pub fn grid(half_mm: f64) -> impl Iterator<Item = DVec2> {
+    let [rows, columns] = GRID;
+    let place = move |i: usize, count: usize| half_mm * ((2 * i + 1) as f64 / count as f64 - 1.0);
+    let row = move |j| (0..columns).map(move |i| DVec2::new(place(i, columns), place(j, rows)));
+    (0..rows).flat_map(row)
+}
+
+impl Followed {
+    /// How far every method's errors at the points swing, as cameras see them that turn the scene to their
+    /// view space.
+    ///
+    /// # Errors
+    /// Inputs that a method refuses.
+    pub fn swing(&self, lab: &Lab, view: View, cameras: &[DAffine3]) -> Result<Outcome, Error> {
+        let (mut frames, mut uvs) = (Vec::new(), Vec::new());
+        for to_view in cameras {
+            let from_view = to_view.inverse();
+            let g = view.shoot(|origin, ray| {
+                let origin = from_view.transform_point3(origin);
+                let (_, hit) = self.scene.hit(origin, from_view.transform_vector3(ray))?;
+                Some(Hit {
+                    point: to_view.transform_point3(hit.point),
+                    normal: to_view.transform_vector3(hit.normal),
+                    ..hit
+                })
+            });
+            let frame = Texels::of(&g, 0.0).upload(&lab.gpu);
+            let results = lab.scatter(&frame.frame(), &frame.output)?.into_iter();
+            let taps = taps(&g, self.points.iter().map(|p| to_view.transform_point3(*p)));
+            let places = taps.iter().map(|t| from_view.transform_point3(t.point));
+            let places: Vec<DVec3> = places.collect();
+            let truths: Vec<DVec3> = places.iter().map(|p| self.scene.scattered(0, *p)).collect();
+            let at_taps = |r: Vec<Vec3>| errors(&taps, &truths, taps.iter().map(|t| r[t.pixel]));
+            let errors: Vec<_> = results.map(|(m, r)| (m, at_taps(r))).collect();
+            uvs.extend(places.into_iter().map(|p| self.scene.uv(0, p)));
+            frames.push((taps, truths, errors));
+        }
+        let textured = self.scene.unwrap(self.texels).scatter(lab, &uvs)?;
+        let mut track = Track::default();
+        let count = self.points.len() * TAPS;
+        for (number, (taps, truths, mut of_methods)) in (0..).zip(frames) {
+            for (method, fetched) in &textured {
+                let fetched = fetched[number as usize * count..][..count].iter().copied();
+                of_methods.push((*method, errors(&taps, &truths, fetched)));
+            }
+            let truth = self
+                .points
+                .iter()
+                .map(|p| self.scene.scattered(0, *p))
+                .collect();
+            track.push(number, truth, of_methods);
+        }
+        // Few enough points for a small picture.
+        let [rows, columns] = GRID;
+        let first = rows / 2 * columns + 4;
+        Ok(track.outcome(Track::swing, first..first + columns - 8))
+    }
 }
 
 /// A place in the picture, in pixels from its upper left.

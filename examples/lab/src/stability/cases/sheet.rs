@@ -7,11 +7,11 @@ use crate::Error;
 use crate::method;
 use glam::{Vec2, Vec3};
 
-use super::super::{Crop, Results, larger, largest};
 use crate::model::glb;
 use crate::renderer::{AtlasRenderer, Camera, Light, Lighting, Renderer, Scene};
-use crate::stability::case::{Outcome, Run};
+use crate::stability::case::{ATLAS, Outcome, Results};
 use crate::stability::lab::Lab;
+use crate::stability::trial::{Crop, apart, merge};
 
 const SIDE_MM: f32 = 24.0;
 /// Low enough to cast no shadow, whose edges would be as fine as a texel.
@@ -29,44 +29,35 @@ pub type Uvs = fn(Vec2) -> Vec2;
 pub const INSIDE: Uvs = |at| 0.05 + 0.9 * at;
 
 /// Each method's largest difference, over these UVs, from the sheet with UVs [`INSIDE`].
-pub fn run(uvs: &'static [Uvs]) -> Run {
-    Box::new(move |lab| {
-        let (truth, is_skin) = scatter(lab, INSIDE)?;
-        let mut figures: Vec<_> = truth.iter().map(|(m, _)| (*m, 0.0)).collect();
-        let mut shown: Results = Vec::new();
-        for uv in uvs {
-            let (results, _) = scatter(lab, *uv)?;
-            for ((_, figure), (a, b)) in figures.iter_mut().zip(results.iter().zip(&truth)) {
-                let pairs =
-                    a.1.iter()
-                        .zip(&b.1)
-                        .zip(&is_skin)
-                        .filter(|(_, skin)| **skin);
-                let differences = pairs.flat_map(|((a, b), _)| (a - b).abs().to_array());
-                *figure = larger(*figure, largest(differences.map(f64::from)));
-            }
-            shown = results;
-        }
-        // Each is held to its own, so that a picture has room for one; the middle half is enough to see.
-        let is_ours = |(name, _): &(&str, _)| *name == "texture_separable";
-        let crop = Crop {
-            first: [0, PIXELS[1] / 4],
-            size: [PIXELS[0], PIXELS[1] / 2],
-        };
-        let own = truth.into_iter().find(is_ours).map(|(_, values)| {
-            let values = values.into_iter().map(|v| v.as_dvec3());
-            values.enumerate().collect::<Vec<_>>()
-        });
-        shown.retain(is_ours);
-        Ok(Outcome {
-            figures,
-            shown: own.map(|truth| crop.show(PIXELS[0], &shown, &truth)),
-        })
-    })
+///
+/// # Errors
+/// A sheet that cannot be drawn, or that a method refuses.
+pub fn run(lab: &Lab, uvs: &[Uvs]) -> Result<Outcome, Error> {
+    let (truth, skin) = scatter(lab, INSIDE)?;
+    let mut outcome = Outcome::default();
+    // Each is held to its own, so that a picture has room for one; the middle half is enough to see.
+    let crop = Crop {
+        first: [0, PIXELS[1] / 4],
+        size: [PIXELS[0], PIXELS[1] / 2],
+    };
+    let own = truth.iter().find(|(name, _)| *name == ATLAS);
+    let own = own.map(|(_, r)| {
+        r.iter()
+            .map(|v| v.as_dvec3())
+            .enumerate()
+            .collect::<Vec<_>>()
+    });
+    for uv in uvs {
+        let (mut results, _) = scatter(lab, *uv)?;
+        merge(&mut outcome.figures, apart(&results, &truth, &skin));
+        results.retain(|(name, _)| *name == ATLAS);
+        outcome.shown = own.as_ref().map(|own| crop.show(PIXELS[0], &results, own));
+    }
+    Ok(outcome)
 }
 
-/// The picture by every method, and which of its pixels show skin.
-fn scatter(lab: &Lab, uv: Uvs) -> Result<(Results, Vec<bool>), Error> {
+/// The picture by every method, and the pixels of it that show skin.
+fn scatter(lab: &Lab, uv: Uvs) -> Result<(Results, Vec<usize>), Error> {
     const MM_PER_UNIT: f32 = 1000.0;
     let gpu = &lab.gpu;
     let mut scene = Scene::from_glb(&sheet(uv))?;
@@ -95,14 +86,21 @@ fn scatter(lab: &Lab, uv: Uvs) -> Result<(Results, Vec<bool>), Error> {
     let frame = buffers.frame(camera.projection(PIXELS), MM_PER_UNIT);
     let mut results = lab.scatter(&frame, &output)?;
     let atlas = AtlasRenderer::new(gpu, &renderer, TEXELS)?;
-    for (name, method) in lab.texture.borrow_mut().iter_mut() {
+    lab.by_atlas(|name, method| {
         atlas.render(gpu, &renderer, 1, MM_PER_UNIT, &output, |atlas, output| {
-            method::scatter_atlas(gpu, &mut **method, atlas, output)
+            method::scatter_atlas(gpu, method, atlas, output)
         })?;
-        results.push((*name, lab.read(&output)));
-    }
-    let ids = gpu.read_bytes(buffers.profile_id.texture());
-    Ok((results, ids.into_iter().map(|id| id == 1).collect()))
+        results.push((name, lab.read(&output)));
+        Ok(())
+    })?;
+    let ids = gpu
+        .read_bytes(buffers.profile_id.texture())
+        .into_iter()
+        .enumerate();
+    Ok((
+        results,
+        ids.filter(|(_, id)| *id == 1).map(|(i, _)| i).collect(),
+    ))
 }
 
 /// The sheet as a binary glTF file, in metres.
