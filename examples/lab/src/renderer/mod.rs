@@ -13,6 +13,7 @@ mod mesh;
 mod pages;
 mod probe;
 mod scene;
+mod timestamps;
 
 pub use atlas::AtlasRenderer;
 pub use camera::{Camera, View};
@@ -20,6 +21,7 @@ pub use gpu::Gpu;
 pub use lighting::{Light, Lighting, Sky, Specular};
 pub use probe::Probe;
 pub use scene::{Image, Material, Primitive, Scene, Vertex};
+pub use timestamps::Timestamps;
 
 use crate::Error;
 use bytemuck::{Pod, Zeroable};
