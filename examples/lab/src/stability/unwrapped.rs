@@ -136,7 +136,7 @@ fn pixel(point_mm: DVec3, irradiance: DVec3, area_mm2: f64) -> Pixel {
             area_mm2: area_mm2 as f32,
             irradiance: irradiance.as_vec3(),
         },
-        // No more than the texels' own spacing: Gaussians narrower than it would come out too narrow.
-        facing_mm2: area_mm2 as f32,
+        // The texels' own spacing, in whatever direction: Gaussians narrower than it would come out too narrow.
+        steps_mm: [DVec3::X, DVec3::Y].map(|step| (step * area_mm2.sqrt()).as_vec3()),
     }
 }
