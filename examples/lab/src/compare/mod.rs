@@ -41,6 +41,10 @@ Usage: cargo run --release --example compare -- [OPTIONS]
   --model FILE        a .glb or .gltf file                        [the built-in head]
   --size WxH          of the pictures, in pixels                  [512x512]
   --view VIEW         front, three-quarter, profile or close-up   [front]
+  --look-at X,Y,Z     a point to look at, in scene units          [the face]
+  --distance X        from that point, in mm                      [600]
+  --skin NAME,…       materials, meshes or nodes that are skin    [by their names]
+  --not-skin NAME,…   materials, meshes or nodes that are not     [by their names]
   --profile FILE      a diffusion profile in JSON                 [skin, six Gaussians]
   --mm-per-unit X     length of a scene unit in mm                [1000: metres]
   --specular FORM     kelemen or li-shao                          [kelemen]
@@ -54,6 +58,10 @@ struct Options {
     size: [u32; 2],
     view: View,
     view_name: String,
+    look_at: Option<Vec3>,
+    distance_mm: f32,
+    /// Names of what is skin, and of what is not.
+    skin: [Vec<String>; 2],
     profile: Profile,
     mm_per_unit: f32,
     specular: Specular,
@@ -81,6 +89,9 @@ fn options() -> Result<Option<Options>, Error> {
         size: [512, 512],
         view: View::Front,
         view_name: "front".into(),
+        look_at: None,
+        distance_mm: 600.0,
+        skin: Default::default(),
         profile: Profile::SKIN,
         mm_per_unit: 1000.0,
         specular: Specular::Kelemen,
@@ -120,6 +131,10 @@ fn options() -> Result<Option<Options>, Error> {
                 options.view_name = text()?;
                 options.view = options.view_name.parse()?;
             }
+            "look-at" => options.look_at = Some(point(&text()?)?),
+            "distance" => options.distance_mm = positive("--distance", &text()?)?,
+            "skin" => options.skin[0] = names(&text()?),
+            "not-skin" => options.skin[1] = names(&text()?),
             "profile" => options.profile = profile(&text()?)?,
             "specular" => options.specular = text()?.parse()?,
             "mm-per-unit" => options.mm_per_unit = positive("--mm-per-unit", &text()?)?,
@@ -144,6 +159,18 @@ fn size(text: &str) -> Result<[u32; 2], Error> {
     text.split_once('x')
         .and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]))
         .ok_or_else(|| Error::new("--size", text, "WIDTHxHEIGHT in pixels, such as 512x512"))
+}
+
+fn point(text: &str) -> Result<Vec3, Error> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
+    let point = numbers.and_then(|numbers| Some(Vec3::from(<[f32; 3]>::try_from(numbers).ok()?)));
+    point
+        .filter(|point| point.is_finite())
+        .ok_or_else(|| Error::new("--look-at", text, "X,Y,Z in scene units, such as 0,1.6,0"))
+}
+
+fn names(text: &str) -> Vec<String> {
+    text.split(',').map(str::to_owned).collect()
 }
 
 fn positive(input: &str, text: &str) -> Result<f32, Error> {
@@ -182,15 +209,21 @@ fn compare(options: &Options) -> Result<(), Error> {
     };
 
     step("loading the model");
-    let (model, scene) = match &options.model {
+    let (model, mut scene) = match &options.model {
         Some(path) => (path.display().to_string(), Scene::load(path)?),
         None => ("built-in head".to_owned(), Scene::from_glb(crate::HEAD)?),
     };
+    scene.choose(&options.skin[0], true, "--skin")?;
+    scene.choose(&options.skin[1], false, "--not-skin")?;
     let gpu = Gpu::headless()?;
     let renderer = Renderer::new(&gpu, &scene, options.size)?;
 
     step("drawing and lighting");
-    let camera = Camera::framing(&scene, options.view, options.size);
+    let distance = options.distance_mm / options.mm_per_unit;
+    let camera = match options.look_at {
+        Some(point) => Camera::looking_at(&scene, options.view, point, distance),
+        None => Camera::framing(&scene, options.view, options.size),
+    };
     let lighting = Lighting {
         specular: options.specular,
         ..Default::default()
@@ -246,6 +279,7 @@ fn compare(options: &Options) -> Result<(), Error> {
             "The primitives differ: {finest:.3} to {coarsest:.3} mm a texel; the coarsest is given."
         ));
     }
+    notes.extend(scene.notes());
     let report = Report {
         adapter: gpu.adapter.clone(),
         size: options.size,
