@@ -5,8 +5,8 @@ use glam::Vec3;
 use super::names;
 use super::scene::{Primitive, Scene, around};
 
-/// A head is less than this of a whole model's height; else the model is a head or a bust.
-const PART: f32 = 0.6;
+/// A head is smaller than this part of a body, from corner to corner; else the model is a head or a bust.
+const PART: f32 = 0.5;
 /// Planes across a model, from its top down.
 const PLANES: usize = 96;
 
@@ -21,16 +21,15 @@ pub(super) struct Head {
 
 impl Head {
     /// By the joints of the head, the names of meshes, the features of the face, or the shape of the skin,
-    /// whichever tells first of a part of the skin.
+    /// whichever is there; all skin, of a head or a bust.
     pub fn of(scene: &Scene) -> Self {
         let whole = scene.skin_bounds();
-        let height = |(min, max): (Vec3, Vec3)| max.y - min.y;
-        let is_part =
-            |found: &(Vec3, Vec3)| height(*found) > 0.0 && height(*found) < PART * height(whole);
-        let found = by_joints(scene).filter(is_part);
-        let found = found.or_else(|| by_names(scene).filter(is_part));
-        let found = found.or_else(|| by_features(scene).filter(is_part));
-        let found = found.or_else(|| by_shape(scene).filter(is_part));
+        let size = |(min, max): (Vec3, Vec3)| (max - min).length();
+        let found = by_joints(scene)
+            .or_else(|| by_names(scene))
+            .or_else(|| by_features(scene))
+            .or_else(|| by_shape(scene))
+            .filter(|found| size(*found) > 0.0 && size(*found) < PART * size(whole));
         let (mut min, max) = found.unwrap_or(whole);
         if found.is_some() {
             min.y -= 0.25 * (max.y - min.y); // the neck

@@ -14,7 +14,7 @@ const OTHER_PARTS: &str = "eye teeth tooth denture tongue hair lash beard mustac
     watch piercing wear metal leather fabric armor armour accessor weapon sword button shadow floor";
 /// What lies on a face.
 const FEATURES: &str =
-    "eye eyes eyeball brow eyebrow lash eyelash iris cornea pupil sclera teeth tongue";
+    "eye eyeball brow eyebrow lash eyelash iris cornea pupil sclera teeth tongue";
 
 /// The words of a name in lower case: `N00_000_EyeIris.001` is n, eye, iris.
 fn words(name: &str) -> impl Iterator<Item = String> {
