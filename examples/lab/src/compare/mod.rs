@@ -43,6 +43,7 @@ Usage: cargo run --release --example compare -- [OPTIONS]
   --view VIEW         front, three-quarter, profile or close-up   [front]
   --look-at X,Y,Z     a point to look at, in scene units          [the face]
   --distance X        from that point, in mm                      [600]
+  --turn X            of the camera about the head, in degrees    [0]
   --skin NAME,…       materials, meshes or nodes that are skin    [by their names]
   --not-skin NAME,…   materials, meshes or nodes that are not     [by their names]
   --profile FILE      a diffusion profile in JSON                 [skin, six Gaussians]
@@ -60,6 +61,7 @@ struct Options {
     view_name: String,
     look_at: Option<Vec3>,
     distance_mm: f32,
+    turn_degrees: f32,
     /// Names of what is skin, and of what is not.
     skin: [Vec<String>; 2],
     profile: Profile,
@@ -91,6 +93,7 @@ fn options() -> Result<Option<Options>, Error> {
         view_name: "front".into(),
         look_at: None,
         distance_mm: 600.0,
+        turn_degrees: 0.0,
         skin: Default::default(),
         profile: Profile::SKIN,
         mm_per_unit: 1000.0,
@@ -133,6 +136,7 @@ fn options() -> Result<Option<Options>, Error> {
             }
             "look-at" => options.look_at = Some(point(&text()?)?),
             "distance" => options.distance_mm = positive("--distance", &text()?)?,
+            "turn" => options.turn_degrees = number("--turn", &text()?)?,
             "skin" => options.skin[0] = names(&text()?),
             "not-skin" => options.skin[1] = names(&text()?),
             "profile" => options.profile = profile(&text()?)?,
@@ -173,11 +177,15 @@ fn names(text: &str) -> Vec<String> {
     text.split(',').map(str::to_owned).collect()
 }
 
+fn number(input: &str, text: &str) -> Result<f32, Error> {
+    let number: Option<f32> = text.parse().ok();
+    let finite = number.filter(|x| x.is_finite());
+    finite.ok_or_else(|| Error::new(input, text, "a number"))
+}
+
 fn positive(input: &str, text: &str) -> Result<f32, Error> {
-    text.parse()
-        .ok()
-        .filter(|x: &f32| x.is_finite() && *x > 0.0)
-        .ok_or_else(|| Error::new(input, text, "a number above 0"))
+    let positive = number(input, text).ok().filter(|x| *x > 0.0);
+    positive.ok_or_else(|| Error::new(input, text, "a number above 0"))
 }
 
 fn profile(path: &str) -> Result<Profile, Error> {
@@ -223,7 +231,8 @@ fn compare(options: &Options) -> Result<(), Error> {
     let camera = match options.look_at {
         Some(point) => Camera::looking_at(&scene, options.view, point, distance),
         None => Camera::framing(&scene, options.view, options.size),
-    };
+    }
+    .turned(options.turn_degrees.to_radians());
     let lighting = Lighting {
         specular: options.specular,
         ..Default::default()

@@ -87,6 +87,12 @@ impl Camera {
         Self::facing(Head::of(scene).forward, view, target, distance)
     }
 
+    /// Turned about what it looks at, in radians, to the right of a person who faces it.
+    pub fn turned(mut self, angle: f32) -> Self {
+        self.eye = self.target + Quat::from_rotation_y(-angle) * (self.eye - self.target);
+        self
+    }
+
     fn facing(forward: Vec3, view: View, target: Vec3, distance: f32) -> Self {
         let yaw: f32 = match view {
             View::Front => 0.0,

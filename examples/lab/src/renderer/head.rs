@@ -25,15 +25,14 @@ impl Head {
     pub fn of(scene: &Scene) -> Self {
         let whole = scene.skin_bounds();
         let size = |(min, max): (Vec3, Vec3)| (max - min).length();
+        let with_neck = |(min, max): (Vec3, Vec3)| (min - 0.25 * (max.y - min.y) * Vec3::Y, max);
         let found = by_joints(scene)
+            .map(with_neck)
             .or_else(|| by_names(scene))
             .or_else(|| by_features(scene))
-            .or_else(|| by_shape(scene))
+            .or_else(|| by_shape(scene).map(with_neck))
             .filter(|found| size(*found) > 0.0 && size(*found) < PART * size(whole));
-        let (mut min, max) = found.unwrap_or(whole);
-        if found.is_some() {
-            min.y -= 0.25 * (max.y - min.y); // the neck
-        }
+        let (min, max) = found.unwrap_or(whole);
         let forward = forward(scene, (min, max)).unwrap_or(Vec3::Z);
         Self { min, max, forward }
     }
@@ -92,8 +91,9 @@ fn by_features(scene: &Scene) -> Option<(Vec3, Vec3)> {
         .filter(|p| named(scene, p, names::is_feature));
     let features = around(points(features.collect()).chain(scene.eyes.iter().copied()));
     let (min, max) = features?;
-    let reach = 0.6 * (max.x - min.x).max(max.z - min.z);
-    let near = |p: &Vec3| p.cmpge(min - reach).all() && p.cmple(max + reach).all();
+    // From ear to ear a head is about twice as wide as from eye to eye, and taller than wide.
+    let reach = 1.8 * (max.x - min.x).max(max.z - min.z);
+    let near = |p: &Vec3| (*p - 0.5 * (min + max)).abs().max_element() <= reach;
     around(points(scene.skin()).filter(near))
 }
 
@@ -116,47 +116,63 @@ fn forward(scene: &Scene, (min, max): (Vec3, Vec3)) -> Option<Vec3> {
     (along.abs() > 0.1 * (max - min).dot(axis)).then_some(axis * along.signum())
 }
 
-/// What a plane of constant height cuts from one limb, least and greatest corner, or all that it cut so far.
+/// A limb as far down as planes of constant height have cut it. Boxes are least and greatest corner.
 #[derive(Clone, Copy)]
 struct Limb {
-    /// On this plane.
+    /// Around what the lowest plane cuts.
     now: (Vec3, Vec3),
-    /// On all planes down to the narrowest.
+    /// Around what all planes cut.
     all: (Vec3, Vec3),
-    /// Area of the boxes around the widest section and the narrowest one below it.
+    /// The same, down to a neck.
+    head: (Vec3, Vec3),
+    /// Area of the boxes around the widest section, and the narrowest below it.
     widest: f32,
     narrowest: f32,
 }
 
 impl Limb {
-    fn area((min, max): (Vec3, Vec3)) -> f32 {
-        (max.x - min.x) * (max.z - min.z)
+    fn new(section: (Vec3, Vec3)) -> Self {
+        let area = area(section);
+        Self {
+            now: section,
+            all: section,
+            head: section,
+            widest: area,
+            narrowest: area,
+        }
     }
 
     /// One plane further down. What narrows and then widens beyond its widest has ended: that is a head on
     /// a neck above shoulders, or a hand on an arm.
     fn grow(&mut self, section: (Vec3, Vec3)) -> Option<Self> {
-        let area = Self::area(section);
-        let has_neck = self.narrowest < 0.7 * self.widest;
+        let area = area(section);
+        let has_neck = self.narrowest < 0.85 * self.widest;
         let ended = (has_neck && area > 1.3 * self.widest).then_some(*self);
-        if area < self.narrowest || !has_neck {
-            self.all = both(self.all, section);
-        }
-        self.narrowest = self.narrowest.min(area);
-        if area > self.widest && !has_neck || ended.is_some() {
+        (self.now, self.all) = (section, both(self.all, section));
+        if area > self.widest && (!has_neck || ended.is_some()) {
             (self.widest, self.narrowest) = (area, area);
         }
-        self.now = section;
+        if area <= self.narrowest {
+            // Below the chin it is neck.
+            if self.narrowest > 0.7 * self.widest {
+                self.head = self.all;
+            }
+            self.narrowest = area;
+        }
         ended
     }
 
-    /// As deep and as wide as heads are for their height.
+    /// As deep and as wide, with its ears, as heads are for their height.
     fn is_head(&self) -> bool {
-        let size = self.all.1 - self.all.0;
+        let size = self.head.1 - self.head.0;
         [size.x, size.z]
             .iter()
-            .all(|x| (0.4..=1.7).contains(&(x / size.y)))
+            .all(|x| (0.4..=2.2).contains(&(x / size.y)))
     }
+}
+
+fn area((min, max): (Vec3, Vec3)) -> f32 {
+    (max.x - min.x) * (max.z - min.z)
 }
 
 /// The largest limb that hangs from nothing above, has a neck, and is shaped as heads are.
@@ -171,14 +187,7 @@ fn by_shape(scene: &Scene) -> Option<(Vec3, Vec3)> {
                 .iter()
                 .filter(meets)
                 .max_by(|a, b| a.widest.total_cmp(&b.widest));
-            let area = Limb::area(section);
-            let fresh = Limb {
-                now: section,
-                all: section,
-                widest: area,
-                narrowest: area,
-            };
-            let mut limb = above.copied().unwrap_or(fresh);
+            let mut limb = above.copied().unwrap_or(Limb::new(section));
             heads.extend(above.and_then(|_| limb.grow(section)));
             next.push(limb);
         }
@@ -186,7 +195,7 @@ fn by_shape(scene: &Scene) -> Option<(Vec3, Vec3)> {
     }
     heads.retain(Limb::is_head);
     let head = heads.iter().max_by(|a, b| a.widest.total_cmp(&b.widest))?;
-    Some(head.all)
+    Some(head.head)
 }
 
 /// What each plane cuts, from the lowest up: boxes around what is connected along x.
