@@ -320,7 +320,9 @@ mod tests {
     #[test]
     fn lattices_have_the_variance_of_the_shader() {
         let shader = crate::exact::gaussian_sum::SHADER;
-        let variances: Vec<f32> = (0..=40).map(|i| 1e-3 * 399f32.powf(i as f32 / 40.0)).collect();
+        let variances: Vec<f32> = (0..=40)
+            .map(|i| 1e-3 * 399f32.powf(i as f32 / 40.0))
+            .collect();
         let inputs: Vec<_> = variances.iter().map(|v| [*v, 1.0, 0.0, 0.0]).collect();
         let call = "vec4f(lattice_variance(x.x, x.y), 0.0, 0.0, 0.0)";
         let found = crate::wgsl::evaluate(shader, call, &inputs);

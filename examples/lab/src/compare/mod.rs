@@ -40,6 +40,11 @@ Usage: cargo run --release --example compare -- [OPTIONS]
   --model FILE        a .glb or .gltf file                        [the built-in head]
   --size WxH          of the pictures, in pixels                  [512x512]
   --view VIEW         front, three-quarter, profile or close-up   [front]
+  --look-at X,Y,Z     a point to look at, in scene units          [the face]
+  --distance X        from that point, in mm                      [600]
+  --turn X            of the camera about the head, in degrees    [0]
+  --skin NAME,…       materials, meshes or nodes that are skin    [by their names]
+  --not-skin NAME,…   materials, meshes or nodes that are not     [by their names]
   --profile FILE      a diffusion profile in JSON                 [skin, six Gaussians]
   --max-error X       largest error of the plan, of white         [1/255]
   --mm-per-unit X     length of a scene unit in mm                [1000: metres]
@@ -54,6 +59,11 @@ struct Options {
     size: [u32; 2],
     view: View,
     view_name: String,
+    look_at: Option<Vec3>,
+    distance_mm: f32,
+    turn_degrees: f32,
+    /// Names of what is skin, and of what is not.
+    skin: [Vec<String>; 2],
     profile: Profile,
     max_error: f32,
     mm_per_unit: f32,
@@ -82,6 +92,10 @@ fn options() -> Result<Option<Options>, Error> {
         size: [512, 512],
         view: View::Front,
         view_name: "front".into(),
+        look_at: None,
+        distance_mm: 600.0,
+        turn_degrees: 0.0,
+        skin: Default::default(),
         profile: Profile::SKIN,
         max_error: DEFAULT_MAX_ERROR,
         mm_per_unit: 1000.0,
@@ -122,6 +136,11 @@ fn options() -> Result<Option<Options>, Error> {
                 options.view_name = text()?;
                 options.view = options.view_name.parse()?;
             }
+            "look-at" => options.look_at = Some(point(&text()?)?),
+            "distance" => options.distance_mm = positive("--distance", &text()?)?,
+            "turn" => options.turn_degrees = number("--turn", &text()?)?,
+            "skin" => options.skin[0] = names(&text()?),
+            "not-skin" => options.skin[1] = names(&text()?),
             "profile" => options.profile = profile(&text()?)?,
             "specular" => options.specular = text()?.parse()?,
             "max-error" => options.max_error = max_error(&text()?)?,
@@ -149,11 +168,27 @@ fn size(text: &str) -> Result<[u32; 2], Error> {
         .ok_or_else(|| Error::new("--size", text, "WIDTHxHEIGHT in pixels, such as 512x512"))
 }
 
+fn point(text: &str) -> Result<Vec3, Error> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
+    let point = numbers.and_then(|numbers| Some(Vec3::from(<[f32; 3]>::try_from(numbers).ok()?)));
+    point
+        .filter(|point| point.is_finite())
+        .ok_or_else(|| Error::new("--look-at", text, "X,Y,Z in scene units, such as 0,1.6,0"))
+}
+
+fn names(text: &str) -> Vec<String> {
+    text.split(',').map(str::to_owned).collect()
+}
+
+fn number(input: &str, text: &str) -> Result<f32, Error> {
+    let number: Option<f32> = text.parse().ok();
+    let finite = number.filter(|x| x.is_finite());
+    finite.ok_or_else(|| Error::new(input, text, "a number"))
+}
+
 fn positive(input: &str, text: &str) -> Result<f32, Error> {
-    text.parse()
-        .ok()
-        .filter(|x: &f32| x.is_finite() && *x > 0.0)
-        .ok_or_else(|| Error::new(input, text, "a number above 0"))
+    let positive = number(input, text).ok().filter(|x| *x > 0.0);
+    positive.ok_or_else(|| Error::new(input, text, "a number above 0"))
 }
 
 /// A number, or a fraction such as 1/255.
@@ -206,10 +241,12 @@ fn compare(options: &Options) -> Result<(), Error> {
     };
 
     step("loading the model");
-    let (model, scene) = match &options.model {
+    let (model, mut scene) = match &options.model {
         Some(path) => (path.display().to_string(), Scene::load(path)?),
         None => ("built-in head".to_owned(), Scene::from_glb(crate::HEAD)?),
     };
+    scene.choose(&options.skin[0], true, "--skin")?;
+    scene.choose(&options.skin[1], false, "--not-skin")?;
     let gpu = Gpu::headless()?;
 
     step("scattering");
@@ -253,6 +290,7 @@ fn compare(options: &Options) -> Result<(), Error> {
             "The primitives differ: {finest:.3} to {coarsest:.3} mm a texel; the coarsest is given."
         ));
     }
+    notes.extend(scene.notes());
     let report = Report {
         adapter: gpu.adapter.clone(),
         size: options.size,
@@ -306,7 +344,12 @@ impl Shot {
         most_runs: usize,
     ) -> Result<Self, Error> {
         let renderer = Renderer::new(gpu, scene, size)?;
-        let camera = Camera::framing(scene, options.view, size);
+        let distance = options.distance_mm / options.mm_per_unit;
+        let camera = match options.look_at {
+            Some(point) => Camera::looking_at(scene, options.view, point, distance),
+            None => Camera::framing(scene, options.view, size),
+        }
+        .turned(options.turn_degrees.to_radians());
         let lighting = Lighting {
             specular: options.specular,
             ..Default::default()

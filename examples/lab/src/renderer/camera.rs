@@ -7,6 +7,10 @@ use glam::camera::rh::proj::directx::perspective_infinite_reverse;
 use glam::{Mat4, Quat, Vec3};
 
 use super::Scene;
+use super::head::Head;
+
+/// Of a portrait lens, in radians: 24°.
+const FOV_Y: f32 = 24.0 * std::f32::consts::PI / 180.0;
 
 /// A perspective camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,9 +55,10 @@ impl FromStr for View {
 }
 
 impl Camera {
-    /// A portrait lens on the skin of a scene. A bust, wider than tall, is framed by its head.
+    /// A portrait lens on a model's head. A bust, wider than tall, is framed by its head.
     pub fn framing(scene: &Scene, view: View, size: [u32; 2]) -> Self {
-        let (min, max) = scene.skin_bounds();
+        let face = Head::of(scene);
+        let (min, max) = (face.min, face.max);
         let extent = max - min;
         let bust = extent.x > 0.9 * extent.y;
         let head = if bust { 0.78 * extent.y } else { extent.y };
@@ -62,26 +67,44 @@ impl Camera {
             max.y - 0.5 * head,
             0.5 * (min.z + max.z),
         );
-        let fov_y = 24f32.to_radians();
-        let (yaw, target, height) = match view {
-            View::Front => (0.0, middle, head),
-            View::ThreeQuarter => (-40.0, middle, head),
-            View::Profile => (-90.0, middle, head),
-            View::CloseUp => (20.0, nose(scene, min.y + 0.35 * extent.y), 0.26 * extent.y),
+        let (target, height) = match view {
+            View::CloseUp => (face.nose(scene, min.y + 0.35 * extent.y), 0.26 * extent.y),
+            _ => (middle, head),
         };
         // Upright frames need the distance that the width asks for.
         let height = height * (size[1] as f32 / size[0] as f32).max(1.0);
         // Not quite to the edge, and from beyond the nearest point.
-        let distance = 0.54 * height / (fov_y / 2.0).tan()
+        let distance = 0.54 * height / (FOV_Y / 2.0).tan()
             + match view {
                 View::CloseUp => 0.0,
-                _ => 0.3 * extent.z,
+                _ => 0.3 * extent.dot(face.forward.abs()),
             };
-        let back = Quat::from_rotation_y(f32::to_radians(yaw)) * Vec3::Z;
+        Self::facing(face.forward, view, target, distance)
+    }
+
+    /// The same lens on any point, from so far away, both in scene units, in a view's direction.
+    pub fn looking_at(scene: &Scene, view: View, target: Vec3, distance: f32) -> Self {
+        Self::facing(Head::of(scene).forward, view, target, distance)
+    }
+
+    /// Turned about what it looks at, in radians, to the right of a person who faces it.
+    pub fn turned(mut self, angle: f32) -> Self {
+        self.eye = self.target + Quat::from_rotation_y(-angle) * (self.eye - self.target);
+        self
+    }
+
+    fn facing(forward: Vec3, view: View, target: Vec3, distance: f32) -> Self {
+        let yaw: f32 = match view {
+            View::Front => 0.0,
+            View::ThreeQuarter => -40.0,
+            View::Profile => -90.0,
+            View::CloseUp => 20.0,
+        };
+        let back = Quat::from_rotation_y(yaw.to_radians()) * forward;
         Self {
             eye: target + distance * back,
             target,
-            fov_y,
+            fov_y: FOV_Y,
         }
     }
 
@@ -116,16 +139,4 @@ impl Camera {
         let height = 2.0 * self.eye.distance(self.target) * (self.fov_y / 2.0).tan();
         size[1] as f32 / height
     }
-}
-
-/// The foremost point above a height: the tip of the nose, of a head that faces +Z.
-fn nose(scene: &Scene, above_y: f32) -> Vec3 {
-    scene
-        .primitives
-        .iter()
-        .flat_map(|p| &p.vertices)
-        .map(|v| Vec3::from(v.position))
-        .filter(|p| p.y >= above_y)
-        .max_by(|a, b| a.z.total_cmp(&b.z))
-        .unwrap_or(Vec3::ZERO)
 }

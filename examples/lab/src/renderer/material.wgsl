@@ -34,6 +34,7 @@ struct VertexIn {
     @location(3) uv: vec2f,
     @location(4) atlas_uv: vec2f,
     @location(5) mask: vec4f,
+    @location(6) color: vec4f,
 }
 
 struct VertexOut {
@@ -44,10 +45,11 @@ struct VertexOut {
     @location(3) uv: vec2f,
     @location(4) atlas_uv: vec2f,
     @location(5) mask: vec4f,
+    @location(6) color: vec4f,
 }
 
 fn vertex_at(in: VertexIn, clip: vec4f) -> VertexOut {
-    return VertexOut(clip, in.position, in.normal, in.tangent, in.uv, in.atlas_uv, in.mask);
+    return VertexOut(clip, in.position, in.normal, in.tangent, in.uv, in.atlas_uv, in.mask, in.color);
 }
 
 @vertex
@@ -156,7 +158,7 @@ fn surface(in: VertexOut) -> Surface {
 fn surface_over(in: VertexOut, footprint: Footprint) -> Surface {
     let dx = footprint.duv_dx;
     let dy = footprint.duv_dy;
-    let base = material.base_color
+    let base = material.base_color * in.color
         * textureSampleGrad(base_color_map, material_sampler, in.uv, dx, dy);
     let mapped = textureSampleGrad(normal_map, material_sampler, in.uv, dx, dy).xyz * 2.0 - 1.0;
     let mm = in.world * camera.mm_per_unit;

@@ -33,8 +33,9 @@ pub(super) struct Mesh {
     indices: wgpu::Buffer,
 }
 
-const ATTRIBUTES: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![
-    0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x2, 4 => Float32x2, 5 => Float32x4
+const ATTRIBUTES: [wgpu::VertexAttribute; 7] = wgpu::vertex_attr_array![
+    0 => Float32x3, 1 => Float32x3, 2 => Float32x4, 3 => Float32x2, 4 => Float32x2, 5 => Float32x4,
+    6 => Float32x4
 ];
 
 impl Mesh {
@@ -92,15 +93,17 @@ impl Mesh {
             };
             upload_image(gpu, index.map_or(&plain, |i| &scene.images[i]), format)
         };
-        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-            label,
-            address_mode_u: wgpu::AddressMode::Repeat,
-            address_mode_v: wgpu::AddressMode::Repeat,
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            mipmap_filter: wgpu::MipmapFilterMode::Linear,
-            ..Default::default()
-        });
+        let sampler = |[u, v]: [wgpu::AddressMode; 2]| {
+            gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                label,
+                address_mode_u: u,
+                address_mode_v: v,
+                mag_filter: wgpu::FilterMode::Linear,
+                min_filter: wgpu::FilterMode::Linear,
+                mipmap_filter: wgpu::MipmapFilterMode::Linear,
+                ..Default::default()
+            })
+        };
         let buffer = |contents: &[u8], usage| {
             gpu.device
                 .create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -161,7 +164,7 @@ impl Mesh {
                         },
                         wgpu::BindGroupEntry {
                             binding: 3,
-                            resource: wgpu::BindingResource::Sampler(&sampler),
+                            resource: wgpu::BindingResource::Sampler(&sampler(material.wrap)),
                         },
                     ],
                 });

@@ -5,14 +5,19 @@
 //! another texture (or none does); [`Renderer::compose`] makes the picture from the one or the
 //! other.
 
+mod accessor;
 mod atlas;
 mod camera;
 mod gpu;
+mod head;
 mod lighting;
 mod mesh;
+mod names;
 mod pages;
 mod probe;
+mod reader;
 mod scene;
+mod tangents;
 mod timestamps;
 
 pub use atlas::AtlasRenderer;

@@ -382,6 +382,8 @@ mod tests {
         let pages = paginate(&mut vertices, &mut indices);
         let primitive = Primitive {
             name: String::new(),
+            node: String::new(),
+            head: None,
             vertices,
             indices,
             material: 0,

@@ -11,7 +11,7 @@ use super::{Camera, Gpu, Pipeline, Primitive, Renderer};
 /// Places are lit so many at a time, in a square texture.
 const SIDE: u32 = 1024;
 /// Numbers of a place, in fours.
-const LAYERS: u32 = 5;
+const LAYERS: u32 = 6;
 
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug)]
@@ -275,5 +275,6 @@ fn texels(
         between(|v| v.tangent.into()),
         between(|v| Vec2::from(v.uv).extend(0.0).extend(0.0)),
         between(|v| v.mask.into()),
+        between(|v| v.color.into()),
     ]
 }

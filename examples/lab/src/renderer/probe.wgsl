@@ -2,7 +2,7 @@
 // and lighting.wgsl.
 
 // A place a texel: world position and footprint in mm; normal and footprint in the textures;
-// tangent; texture coordinates; mask.
+// tangent; texture coordinates; mask; color.
 @group(3) @binding(0) var places: texture_2d_array<f32>;
 
 // What a pixel shows: its position, in mm.
@@ -42,6 +42,7 @@ fn fs_irradiance(@builtin(position) at: vec4f) -> @location(0) vec4f {
         textureLoad(places, texel, 3, 0).xy,
         vec2f(0.0),
         textureLoad(places, texel, 4, 0),
+        textureLoad(places, texel, 5, 0),
     );
     let footprint = Footprint(position.w, vec2f(normal.w, 0.0), vec2f(0.0, normal.w));
     let s = surface_over(in, footprint);

@@ -248,7 +248,7 @@ fn zoom(quick: bool) -> Case {
         let rows = plan.rows(0);
         let blurs = |i: usize| {
             let mut weights = rows[i].weights.iter();
-            weights.rposition(|w| w.max_element() > 0.0)
+            weights.rposition(|w| w.iter().any(|c| *c > 0.0))
         };
         // Weights are mixed from row to row: what is new fades in from the one to the other.
         let switches = (1..rows.len()).filter(|i| blurs(*i) != blurs(i - 1));
