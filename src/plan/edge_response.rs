@@ -47,7 +47,7 @@ struct Sample {
 }
 
 impl Responses {
-    pub fn new(kernels: &Kernels, levels: usize) -> Self {
+    pub(super) fn new(kernels: &Kernels, levels: usize) -> Self {
         let mut responses = Self {
             samples: Vec::new(),
             columns: vec![Vec::new(); kernels.variances_px2(levels).len()],
@@ -73,7 +73,7 @@ impl Responses {
     /// Gaussian vᵢ to a step (Li & Shao 2015, Eq. 9).
     ///
     /// A hard edge is scattered by the weights of the visible integral, on the pixels' lattice.
-    pub fn wanted(&self, profile: &Profile, px_per_mm: f64) -> [Vec<f64>; 3] {
+    pub(super) fn wanted(&self, profile: &Profile, px_per_mm: f64) -> [Vec<f64>; 3] {
         let mut wanted = [0; 3].map(|_| vec![0.0; self.samples.len()]);
         for gaussian in profile.gaussians() {
             let px2 = f64::from(gaussian.variance_mm2) * px_per_mm * px_per_mm;

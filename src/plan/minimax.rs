@@ -29,7 +29,7 @@ pub(crate) struct Target {
 
 impl Target {
     /// That all of the mixture is to be these values.
-    pub fn new(values: Vec<f64>) -> Self {
+    pub(crate) fn new(values: Vec<f64>) -> Self {
         Self {
             share: 1.0,
             values,
@@ -90,7 +90,7 @@ pub(crate) struct Minimax {
 impl Minimax {
     /// x = (1, 0, …, 0), with the constraint t ≥ Σx − x₀ − 2, which any target replaces. Of the other
     /// unknowns only those in `used` may grow.
-    pub fn new(n: usize, used: impl Fn(usize) -> bool) -> Self {
+    pub(crate) fn new(n: usize, used: impl Fn(usize) -> bool) -> Self {
         let unit = |k: usize| {
             let mut column = vec![0.0; n + 1];
             column[k] = 1.0;
@@ -117,7 +117,7 @@ impl Minimax {
 
     /// Exchanges constraints until none is violated. False, and not at an end, if no x keeps all residuals
     /// within `limit`.
-    pub fn solve(&mut self, columns: &[Vec<f64>], targets: &[Target], limit: f64) -> bool {
+    pub(crate) fn solve(&mut self, columns: &[Vec<f64>], targets: &[Target], limit: f64) -> bool {
         let n = columns.len();
         for _ in 0..EXCHANGES * n {
             let (x, t) = (&self.point[..n], self.point[n]);
@@ -158,7 +158,7 @@ impl Minimax {
     }
 
     /// Leaves a column out from now on.
-    pub fn leave_out(&mut self, j: usize) {
+    pub(crate) fn leave_out(&mut self, j: usize) {
         let slot = self.bounds.iter().position(|bound| *bound == Some(j));
         let slot = slot.or_else(|| {
             let mut gradient = vec![0.0; self.point.len()];
@@ -211,7 +211,7 @@ impl Minimax {
     }
 
     /// The x that was found, 1 in all.
-    pub fn weights(&self) -> Vec<f64> {
+    pub(crate) fn weights(&self) -> Vec<f64> {
         let mut x = self.point[..self.point.len() - 1].to_vec();
         x.iter_mut()
             .for_each(|x| *x = if *x > ACCURACY { *x } else { 0.0 });

@@ -18,7 +18,7 @@ pub(super) struct Stored {
 pub(super) type Row = (f32, f32, &'static [(usize, [u32; 3])]);
 
 impl Stored {
-    pub fn weights(&self) -> Weights {
+    pub(super) fn weights(&self) -> Weights {
         let kernels = KERNELS[self.set];
         let slots = Weights::slots(&kernels);
         let mixture = |(predicted_error, unscattered_error, stored): &Row| {

@@ -78,16 +78,16 @@ impl Weights {
     }
 
     /// As shaders have it.
-    pub fn first_octave(&self) -> f32 {
+    pub(crate) fn first_octave(&self) -> f32 {
         self.first_octave as f32
     }
 
-    pub fn row_count(&self) -> usize {
+    pub(crate) fn row_count(&self) -> usize {
         self.profiles[0].len()
     }
 
     /// Where blur `j` of level `l` is in a row of weights; the light that stays is at 0.
-    pub fn slot(&self, level: usize, j: usize) -> usize {
+    pub(crate) fn slot(&self, level: usize, j: usize) -> usize {
         let Kernels { fine, coarse } = &self.kernels;
         match level {
             0 => 1 + j,
@@ -96,18 +96,18 @@ impl Weights {
     }
 
     /// Where the sum of the weights of all levels beyond `level` is.
-    pub fn rest_slot(&self, level: usize) -> usize {
+    pub(crate) fn rest_slot(&self, level: usize) -> usize {
         self.slot(self.levels + 1, 0) + level
     }
 
     /// Vectors to a row of [`table`](Self::table).
-    pub fn stride(&self) -> usize {
+    pub(crate) fn stride(&self) -> usize {
         self.rest_slot(self.levels) + 1
     }
 
     /// The weights as the shaders have them: of each profile the rows, of each row the slots, and in
     /// the last component of its first one its level.
-    pub fn table(&self) -> Vec<Vec4> {
+    pub(crate) fn table(&self) -> Vec<Vec4> {
         let mut table = Vec::new();
         for row in self.profiles.iter().flatten() {
             let weights: Vec<Vec3> = row.weights.iter().map(|w| Vec3::from(*w)).collect();
@@ -121,7 +121,7 @@ impl Weights {
     }
 
     /// Texel fetches for a pixel of a simple tile at a scale, all levels' shares and the copy included.
-    pub fn fetches(&self, rows: &[Row], px_per_mm: f32) -> f32 {
+    pub(crate) fn fetches(&self, rows: &[Row], px_per_mm: f32) -> f32 {
         let octave = f64::from(px_per_mm).log2() - self.first_octave;
         let i = (octave * ROWS_PER_OCTAVE).clamp(0.0, (rows.len() - 2) as f64) as usize;
         let used = |slot: usize| rows[i..i + 2].iter().any(|r| r.weights[slot] != [0.0; 3]);
@@ -151,14 +151,14 @@ impl Weights {
     }
 
     /// The row that tiles.wgsl asks for the level of a tile.
-    pub fn tile_row(&self, px_per_mm: f32) -> usize {
+    pub(crate) fn tile_row(&self, px_per_mm: f32) -> usize {
         let rows = (px_per_mm.log2() - self.first_octave()) * ROWS_PER_OCTAVE as f32;
         let row = rows.ceil() + ROWS_BEYOND;
         row.clamp(0.0, (self.row_count() - 1) as f32) as usize
     }
 
     /// The largest error on straight edges, of any profile at any scale.
-    pub fn predicted_error(&self) -> f32 {
+    pub(crate) fn predicted_error(&self) -> f32 {
         let rows = self.profiles.iter().flatten();
         rows.map(|r| r.predicted_error).fold(0.0, f32::max)
     }
