@@ -24,6 +24,10 @@ struct View {
     // Of the viewport, in the textures of the host.
     first_pixel: vec2u,
     size: vec2u,
+    // What a tile may have of difficulty times range of light and still be planar.
+    planar_limit: f32,
+    // Levels above the frame.
+    levels: u32,
 }
 
 // A Gaussian, cut off by a shape of taps.
@@ -52,16 +56,18 @@ struct Level {
     rest: u32,
     // 1 where there is a coarser level.
     coarser: u32,
+    // Where its tiles are in lists, and how many.
+    first_tile: u32,
+    tile_count: u32,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> level: Level;
-// x in the low half: those that are simple from the front on, the others from the end.
+// Of all levels; x in the low half. Of a level the planar ones from the front on, the others from the end.
 @group(0) @binding(2) var<storage, read> tiles: array<u32>;
 
-// Whether a tile may hold whatever there is; else it is skin of one profile throughout, nearly flat and
-// turned evenly, and so are the pixels around it.
-override CAREFUL: bool = true;
+// Whether a pass is over the tiles that are not planar.
+override GENERAL: bool = true;
 
 const TILE = 8u;
 // How far from the plane a pixel may lie to be of the same surface, in mm a pixel of the level.
@@ -70,7 +76,8 @@ const TOLERANCE = 2.0;
 const LEAST_AREA = 1e-3;
 
 fn tile_of(instance: u32) -> vec2u {
-    let tile = tiles[select(instance, arrayLength(&tiles) - 1u - instance, CAREFUL)];
+    let place = select(instance, level.tile_count - 1u - instance, GENERAL);
+    let tile = tiles[level.first_tile + place];
     return vec2u(tile & 0xffffu, tile >> 16u);
 }
 
@@ -94,8 +101,8 @@ fn vs_tile(
 
 // The two textures that hold a surface.
 struct Surface {
-    // Light, and area over that of a surface that faces the camera; less where part of the pixel is
-    // not of it.
+    // Area over that of a surface that faces the camera, less where part of the pixel is not of it; and
+    // light times that.
     @location(0) light: vec4f,
     @location(1) shape: vec2u,
 }
