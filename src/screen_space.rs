@@ -173,22 +173,6 @@ impl View {
         self.record(encoder, output, Some((queries, first_query)))
     }
 
-    /// EXPERIMENT
-    #[doc(hidden)]
-    pub fn tiles_drawn(&self, device: &Device, queue: &Queue) -> String {
-        let Some(view) = &self.pyramid else { return String::new() };
-        let draws = view.draws();
-        let copy = device.create_buffer(&wgpu::BufferDescriptor { label: None, size: draws.size(), usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ, mapped_at_creation: false });
-        let mut encoder = device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(draws, 0, &copy, 0, draws.size());
-        queue.submit([encoder.finish()]);
-        copy.map_async(wgpu::MapMode::Read, .., |r| r.unwrap());
-        let _ = device.poll(wgpu::PollType::wait_indefinitely());
-        let bytes = copy.get_mapped_range(..).unwrap();
-        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
-        words.chunks(8).map(|c| format!("{}+{} ", c[1], c[5])).collect()
-    }
-
     fn record(
         &self,
         encoder: &mut CommandEncoder,

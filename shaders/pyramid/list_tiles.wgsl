@@ -15,12 +15,6 @@ struct Draw {
     first_instance: u32,
 }
 
-const GRIDS = 11u;
-const LEVELS = 0x7ffu;
-const DIFFICULTY_SHIFT = 11u;
-const NOT_SKIN = 1u << 15u;
-const PROFILES = 0xffff0000u;
-
 struct Contents {
     marks: u32,
     brightest: u32,
@@ -38,29 +32,38 @@ fn contents_of(grid: vec4u, tile: vec2i) -> Contents {
 
 // What a tile and those around it hold together.
 fn contents_around(grid: vec4u, tile: vec2i) -> Contents {
-    var all = Contents();
+    var held = Contents();
     for (var i = 0; i < 9; i++) {
         let one = contents_of(grid, tile + vec2i(i % 3, i / 3) - 1);
-        all.marks |= one.marks;
-        all.brightest = max(all.brightest, one.brightest);
-        all.darkest = max(all.darkest, one.darkest);
+        held.marks |= one.marks;
+        held.brightest = max(held.brightest, one.brightest);
+        held.darkest = max(held.darkest, one.darkest);
     }
-    return all;
-}
-
-// Whether a tile is blurred well enough as if all of it lay on planes: of one profile, and hardly bent, or
-// hardly of different light.
-fn is_planar(around: Contents, l: u32) -> bool {
-    let difficulty = (around.marks >> DIFFICULTY_SHIFT) & 15u;
-    // The largest bound that the surface passed: .03, .125, .5 or 2, and twice that on each level.
-    var bend = select(0.0, exp2(f32(2u * firstLeadingBit(difficulty) + l) - 5.0), difficulty != 0u);
-    bend = max(bend, select(0.0, HOLES, (around.marks & NOT_SKIN) != 0u));
-    let range = bitcast<f32>(around.brightest) - bitcast<f32>(~around.darkest);
-    return countOneBits(around.marks & PROFILES) == 1u && min(bend, 2.0) * range <= view.planar_limit;
+    return held;
 }
 
 // What pixels without skin are taken for.
 const HOLES = 1.0;
+
+// Whether pixels are so far from square that blurs of few taps do not fit them, and not so far that steps of
+// two pixels do.
+fn has_odd_pixels() -> bool {
+    // Of a perspective camera the latter are 0, of an orthographic one the former.
+    let px = abs(view.step.xy) + abs(view.step.zw);
+    let ratio = max(px.x, px.y) / min(px.x, px.y);
+    return ratio > 1.1 && ratio < 1.7;
+}
+
+// How far blurs that take the surface for planar may be off, in tiles that hold so much together: how bent
+// the surface is, up to 2, times the range of light.
+fn doubt(held: Contents, l: u32) -> f32 {
+    let difficulty = (held.marks >> DIFFICULTY_SHIFT) & 15u;
+    // The largest bound that the surface passed: .03, .125, .5 or 2, and twice that on each level.
+    var bend = select(0.0, exp2(f32(2u * firstLeadingBit(difficulty) + l) - 5.0), difficulty != 0u);
+    bend = max(bend, select(0.0, HOLES, (held.marks & NOT_SKIN) != 0u));
+    bend = max(bend, select(0.0, 2.0, has_odd_pixels()));
+    return min(bend, 2.0) * (bitcast<f32>(held.brightest) - bitcast<f32>(~held.darkest));
+}
 
 // One thread a tile: lists those with skin that need their level, or are next to one that does.
 @compute @workgroup_size(8, 8)
@@ -68,7 +71,11 @@ fn list_tiles(@builtin(global_invocation_id) at: vec3u) {
     let l = at.z;
     let grid = grids[l];
     let tile = vec2i(at.xy);
-    if any(at.xy >= grid.xy) || (contents_of(grid, tile).marks & PROFILES) == 0u {
+    if any(at.xy >= grid.xy) {
+        return;
+    }
+    let middle = contents_of(grid, tile);
+    if (middle.marks & PROFILES) == 0u {
         return;
     }
     let around = contents_around(grid, tile);
@@ -76,10 +83,16 @@ fn list_tiles(@builtin(global_invocation_id) at: vec3u) {
         return;
     }
     let word = (at.y << 16u) | at.x;
-    if is_planar(around, l) {
-        list[grid.z + atomicAdd(&draws[2u * l].instances, 1u)] = word;
-    } else {
+    var near = middle;
+    if has_odd_pixels() {
+        near = around;
+    }
+    if l == 0u && doubt(near, l) > view.general_limit {
+        list[view.first_direct + atomicAdd(&draws[DIRECT].instances, 1u)] = word;
+    } else if countOneBits(around.marks & PROFILES) > 1u || doubt(around, l) > view.planar_limit {
         let end = grid.z + grid.x * grid.y - 1u;
-        list[end - atomicAdd(&draws[2u * l + 1u].instances, 1u)] = word;
+        list[end - atomicAdd(&draws[CLASSES * l + GENERAL].instances, 1u)] = word;
+    } else {
+        list[grid.z + atomicAdd(&draws[CLASSES * l + PLANAR].instances, 1u)] = word;
     }
 }

@@ -11,17 +11,10 @@
 @group(0) @binding(9) var<uniform> grids: array<vec4u, GRIDS>;
 @group(0) @binding(10) var<storage, read_write> contents: array<atomic<u32>>;
 
-const GRIDS = 11u;
-const ROWS_PER_OCTAVE = 6.0;
 // ∂z over the mm of a pixel that a surface may have.
 const STEEPEST = 40.0;
 
-// What a tile holds, gathered over its pixels. A bit each, so that several tiles together hold all of
-// theirs: each level that light is needed of; how difficult its surface is; whether there is anything but
-// skin; each profile.
-const DIFFICULTY_SHIFT = 11u;
-const NOT_SKIN = 1u << 15u;
-const PROFILE_SHIFT = 16u;
+// What the tile holds, gathered over its pixels.
 var<workgroup> marks: atomic<u32>;
 // Bits of a float, which as integers are in its order; of the darkest what all bits differ in.
 var<workgroup> brightest: atomic<u32>;

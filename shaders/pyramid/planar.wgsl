@@ -121,11 +121,6 @@ fn gathered(pixel: vec2i, here: vec4f, e: vec3f, tile: Corner) -> Gathered {
     return with_coarser(blurred, wanted, e, rest, found);
 }
 
-// The light of a pixel that holds so much for its area.
-fn light_of(here: vec4f) -> vec3f {
-    return here.rgb / max(here.a, 1e-6);
-}
-
 @fragment
 fn fs_level(tile: Corner) -> @location(0) vec4f {
     let pixel = vec2i(tile.at.xy);

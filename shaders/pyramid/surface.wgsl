@@ -24,10 +24,13 @@ struct View {
     // Of the viewport, in the textures of the host.
     first_pixel: vec2u,
     size: vec2u,
-    // What a tile may have of difficulty times range of light and still be planar.
+    // How far planar blurs may be off in a tile by their looks, for it to be planar, and to be general.
     planar_limit: f32,
+    general_limit: f32,
     // Levels above the frame.
     levels: u32,
+    // Where tiles that are summed directly are in lists.
+    first_direct: u32,
 }
 
 // A Gaussian, cut off by a shape of taps.
@@ -63,11 +66,27 @@ struct Level {
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> level: Level;
-// Of all levels; x in the low half. Of a level the planar ones from the front on, the others from the end.
+// Of all levels; x in the low half. Of a level the planar ones from the front on, the general ones from the
+// end; those of the frame that are summed directly after all levels.
 @group(0) @binding(2) var<storage, read> tiles: array<u32>;
 
-// Whether a pass is over the tiles that are not planar.
-override GENERAL: bool = true;
+// Which tiles a pass is over.
+override CLASS: u32 = 0u;
+const PLANAR = 0u;
+const GENERAL = 1u;
+const DIRECT = 2u;
+const CLASSES = 3u;
+
+// What a tile holds, a bit each, so that several together hold all of theirs: each level that light is needed
+// of; how difficult the surface is; whether there is anything but skin; each profile.
+const LEVELS = 0x7ffu;
+const DIFFICULTY_SHIFT = 11u;
+const NOT_SKIN = 1u << 15u;
+const PROFILE_SHIFT = 16u;
+const PROFILES = 0xffffu << PROFILE_SHIFT;
+// The frame and its levels.
+const GRIDS = 11u;
+const ROWS_PER_OCTAVE = 6.0;
 
 const TILE = 8u;
 // How far from the plane a pixel may lie to be of the same surface, in mm a pixel of the level.
@@ -76,8 +95,13 @@ const TOLERANCE = 2.0;
 const LEAST_AREA = 1e-3;
 
 fn tile_of(instance: u32) -> vec2u {
-    let place = select(instance, level.tile_count - 1u - instance, GENERAL);
-    let tile = tiles[level.first_tile + place];
+    var place = level.first_tile + instance;
+    if CLASS == GENERAL {
+        place = level.first_tile + level.tile_count - 1u - instance;
+    } else if CLASS == DIRECT {
+        place = view.first_direct + instance;
+    }
+    let tile = tiles[place];
     return vec2u(tile & 0xffffu, tile >> 16u);
 }
 

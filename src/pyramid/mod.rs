@@ -1,5 +1,6 @@
-//! Scattering by a plan, over a pyramid of the frame: drives `shaders/tiles.wgsl`, and the passes
-//! over tiles that follow `shaders/surface.wgsl`.
+//! Scattering by a plan, over a pyramid of the frame: drives `shaders/pyramid/`. A compute pass packs the frame
+//! and says what its tiles hold, another lists those of each level by their class; all others are drawn over
+//! these lists.
 
 mod passes;
 mod scratch;
@@ -15,11 +16,12 @@ use crate::optics::Optics;
 use crate::plan::Weights;
 use crate::{Error, Frame, Output};
 use passes::{LIGHT, OverTiles, Passes};
-use scratch::{DRAW_BYTES, Scratch};
+use scratch::{CLASSES, DRAW_BYTES, Scratch};
 
-/// How much of the plan's error light may differ by in the reach of a tile, times how difficult its surface
-/// is, for the tile to be planar.
-const PLANAR_ERRORS: f32 = 200.0;
+/// How far planar blurs may be off in a tile by its looks (`doubt` of list_tiles.wgsl), over the error of the
+/// plan, for it to be planar, and to be general. Found on heads: beyond these, errors grow; below, only the work.
+const PLANAR_LIMIT: f32 = 180.0;
+const GENERAL_LIMIT: f32 = 150.0;
 
 /// The passes of a plan, and its weights.
 #[derive(Debug)]
@@ -66,12 +68,6 @@ struct Textures {
     /// The irradiance where there is none; it is not looked at then.
     strength: TextureView,
     albedo: TextureView,
-}
-
-impl PyramidView {
-    pub fn draws(&self) -> &Buffer {
-        &self.scratch.draws
-    }
 }
 
 impl Pyramid {
@@ -159,9 +155,10 @@ impl Pyramid {
             profiles: plan.profiles.len() as u32,
             first_pixel: frame.rectangle().first(),
             size: size.into(),
-            planar_limit: std::env::var("PLANAR").map_or(PLANAR_ERRORS, |v| v.parse().unwrap()) * plan.predicted_error(),
+            planar_limit: PLANAR_LIMIT * plan.predicted_error(),
+            general_limit: GENERAL_LIMIT * plan.predicted_error(),
             levels: view.scratch.levels.len() as u32 - 1,
-            pad: [0; 2],
+            first_direct: view.scratch.tile_count,
         };
         queue.write_buffer(&view.scratch.view, 0, bytemuck::bytes_of(&numbers));
         let read = Textures {
@@ -289,7 +286,11 @@ impl Pyramid {
         encoder.copy_buffer_to_buffer(&scratch.no_draws, 0, &scratch.draws, 0, draws);
         encoder.clear_buffer(&scratch.contents, 0, None);
         // Nothing is drawn: it clears what is packed.
-        recorder.draw("subsurface::pyramid clear", &[&base.light, &base.shape], false);
+        recorder.draw(
+            "subsurface::pyramid clear",
+            &[&base.light, &base.shape],
+            false,
+        );
         {
             let [x, y] = base.tiles;
             let mut pass = recorder.dispatch("subsurface::pyramid pack");
@@ -336,7 +337,7 @@ fn over_tiles(
     l: usize,
 ) {
     pass.set_bind_group(0, group, &[]);
-    for (i, pipeline) in (2 * l as u64..).zip(&draws.pipelines) {
+    for (i, pipeline) in (CLASSES * l as u64..).zip(&draws.pipelines) {
         pass.set_pipeline(pipeline);
         pass.draw_indirect(&scratch.draws, i * DRAW_BYTES);
     }

@@ -26,8 +26,8 @@ pub(super) const PACK: &[&str] = &[SURFACE, wgsl!("pack")];
 pub(super) const LIST_TILES: &[&str] = &[SURFACE, wgsl!("list_tiles")];
 const DOWNSAMPLE: &[&str] = &[SURFACE, wgsl!("downsample")];
 pub(super) const PLANAR: &[&str] = &[SURFACE, BLUR, wgsl!("planar")];
-const LEVEL_GENERAL: &[&str] = &[SURFACE, BLUR, wgsl!("level_general")];
-pub(super) const FRAME_GENERAL: &[&str] = &[SURFACE, BLUR, wgsl!("frame_general")];
+const GENERAL: &[&str] = &[SURFACE, BLUR, wgsl!("general")];
+pub(super) const DIRECT: &[&str] = &[SURFACE, BLUR, wgsl!("direct")];
 const COPY: &[&str] = &[SURFACE, wgsl!("copy")];
 
 #[derive(Debug)]
@@ -36,11 +36,11 @@ pub(super) struct Compute {
     pub pipeline: ComputePipeline,
 }
 
-/// Pipelines over the planar tiles of a level, and over the others.
+/// Pipelines over the tiles of a level, by their class: planar, general, and on the frame direct.
 #[derive(Debug)]
 pub(super) struct OverTiles {
     pub layout: BindGroupLayout,
-    pub pipelines: [RenderPipeline; 2],
+    pub pipelines: Vec<RenderPipeline>,
 }
 
 /// All passes.
@@ -65,8 +65,7 @@ impl Passes {
             Compute { layout, pipeline }
         };
         let over_tiles = |entry: &str,
-                          vertex: [&str; 2],
-                          files: [&[&str]; 2],
+                          classes: &[(&str, &[&str])],
                           bindings: &[(u32, BindingType)],
                           targets: &[TextureFormat],
                           kinds: Option<&Kinds>| {
@@ -78,8 +77,8 @@ impl Passes {
                 _ => targets.iter().map(|t| Some((*t).into())).collect(),
             };
             let flag = |on| f64::from(u8::from(on));
-            let pipelines = [0, 1].map(|general| {
-                let mut constants = vec![("GENERAL", general as f64)];
+            let pipeline = |(class, (vertex, files)): (u32, &(&str, &[&str]))| {
+                let mut constants = vec![("CLASS", class.into())];
                 if let Some(kinds) = kinds {
                     constants.extend([
                         ("BLURS", kinds.variances_px2.len() as f64),
@@ -89,11 +88,11 @@ impl Passes {
                         ("DIFFERENCE", flag(output.adds())),
                     ]);
                 }
-                let module: ShaderModule = gpu::module(device, &label, files[general]);
+                let module: ShaderModule = gpu::module(device, &label, files);
                 gpu::Draw {
                     label: &label,
                     module: &module,
-                    vertex: vertex[general],
+                    vertex,
                     fragment: entry,
                     layout: &layout,
                     topology: PrimitiveTopology::TriangleStrip,
@@ -101,7 +100,8 @@ impl Passes {
                     constants: &constants,
                 }
                 .pipeline(device)
-            });
+            };
+            let pipelines = (0..).zip(classes).map(pipeline).collect();
             OverTiles { layout, pipelines }
         };
         let level = [
@@ -117,7 +117,13 @@ impl Passes {
         ];
         let frame: Vec<_> = level
             .into_iter()
-            .chain([(4, FLOATS), (5, FLOATS), (13, UNIFORM), (14, FLOATS), (15, UINTS)])
+            .chain([
+                (4, FLOATS),
+                (5, FLOATS),
+                (13, UNIFORM),
+                (14, FLOATS),
+                (15, UINTS),
+            ])
             .collect();
         let copy_label = "subsurface::pyramid fs_copy";
         let copy_layout = gpu::layout(
@@ -146,12 +152,17 @@ impl Passes {
             list_tiles: compute(
                 "list_tiles",
                 LIST_TILES,
-                &[(0, UNIFORM), (9, UNIFORM), (10, READ), (11, WRITE), (12, WRITE)],
+                &[
+                    (0, UNIFORM),
+                    (9, UNIFORM),
+                    (10, READ),
+                    (11, WRITE),
+                    (12, WRITE),
+                ],
             ),
             downsample: over_tiles(
                 "fs_downsample",
-                ["vs_tile"; 2],
-                [DOWNSAMPLE; 2],
+                &[("vs_tile", DOWNSAMPLE); 2],
                 &[
                     (0, UNIFORM),
                     (1, UNIFORM),
@@ -165,16 +176,18 @@ impl Passes {
             ),
             level: over_tiles(
                 "fs_level",
-                ["vs_corner", "vs_tile"],
-                [PLANAR, LEVEL_GENERAL],
+                &[("vs_corner", PLANAR), ("vs_tile", GENERAL)],
                 &level,
                 &[LIGHT],
                 Some(&plan.kernels.coarse),
             ),
             frame: over_tiles(
                 "fs_frame",
-                ["vs_corner", "vs_tile"],
-                [PLANAR, FRAME_GENERAL],
+                &[
+                    ("vs_corner", PLANAR),
+                    ("vs_tile", GENERAL),
+                    ("vs_tile", DIRECT),
+                ],
                 &frame,
                 &[],
                 Some(&plan.kernels.fine),

@@ -29,8 +29,9 @@ pub(super) struct View {
     pub first_pixel: UVec2,
     pub size: UVec2,
     pub planar_limit: f32,
+    pub general_limit: f32,
     pub levels: u32,
-    pub pad: [u32; 2],
+    pub first_direct: u32,
 }
 
 /// `Blur` of surface.wgsl.
@@ -60,7 +61,7 @@ struct Level {
     pad: u32,
 }
 
-/// `Step` of frame_general.wgsl.
+/// `Step` of direct.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
 struct Step {
@@ -72,8 +73,10 @@ struct Step {
 /// Gaussians of the frame in twos, then a step for each level.
 pub(super) const STEPS: usize = 2 + MAX_LEVELS;
 
-/// Bytes of a `Draw` of list_tiles.wgsl; each level has two, of planar tiles and of the others.
+/// Bytes of a `Draw` of list_tiles.wgsl.
 pub(super) const DRAW_BYTES: u64 = 16;
+/// Draws of a level, one for each class of tiles.
+pub(super) const CLASSES: u64 = 3;
 /// Words of what a tile holds.
 const CONTENTS: u32 = 3;
 
@@ -95,6 +98,8 @@ pub(super) struct Scratch {
     pub lights: TextureView,
     pub shapes: TextureView,
     pub levels: Vec<LevelScratch>,
+    /// Tiles of all levels.
+    pub tile_count: u32,
     /// Means of level 1 and of level 2, and by turns of those above.
     pub means: [TextureView; 2],
 }
@@ -144,7 +149,7 @@ pub(super) fn bytes(size: [u32; 2], plan: &Weights) -> u64 {
     };
     let levels: u64 = (0..=level_count(size, plan)).map(of_level).sum();
     let means = [1, 2].map(|l| 8 * count(size_of_level(size, l)));
-    levels + means.iter().sum::<u64>()
+    levels + means.iter().sum::<u64>() + 4 * count(tiles_of_level(size, 0))
 }
 
 impl Scratch {
@@ -206,11 +211,18 @@ impl Scratch {
         for (grid, level) in grids.iter_mut().zip(&levels) {
             *grid = UVec4::new(level.tiles[0], level.tiles[1], level.first_tile, 0);
         }
-        let grids_buffer = gpu::uniform_buffer::<[UVec4; 1 + MAX_LEVELS]>(device, "subsurface::pyramid grids");
+        let grids_buffer =
+            gpu::uniform_buffer::<[UVec4; 1 + MAX_LEVELS]>(device, "subsurface::pyramid grids");
         queue.write_buffer(&grids_buffer, 0, bytemuck::bytes_of(&grids));
-        let no_draws: Vec<u32> = [4u32, 0, 0, 0].repeat(2 * levels.len());
-        let mean =
-            |l| gpu::scratch_texture(device, "subsurface::pyramid mean", size_of_level(size, l), LIGHT);
+        let no_draws: Vec<u32> = [4u32, 0, 0, 0].repeat(CLASSES as usize * levels.len());
+        let mean = |l| {
+            gpu::scratch_texture(
+                device,
+                "subsurface::pyramid mean",
+                size_of_level(size, l),
+                LIGHT,
+            )
+        };
         Self {
             size,
             view: gpu::uniform_buffer::<View>(device, "subsurface::pyramid view"),
@@ -221,7 +233,11 @@ impl Scratch {
                 CONTENTS * first_tile,
                 BufferUsages::COPY_DST,
             ),
-            list: words("subsurface::pyramid tiles", first_tile, BufferUsages::COPY_SRC),
+            list: words(
+                "subsurface::pyramid tiles",
+                first_tile + levels[0].tiles[0] * levels[0].tiles[1],
+                BufferUsages::empty(),
+            ),
             draws: words(
                 "subsurface::pyramid draws",
                 no_draws.len() as u32,
@@ -236,6 +252,7 @@ impl Scratch {
             lights: lights.create_view(&Default::default()),
             shapes: shapes.create_view(&Default::default()),
             levels,
+            tile_count: first_tile,
             means: [mean(1), mean(2)],
         }
     }
@@ -313,32 +330,35 @@ fn level_settings(plan: &Weights, l: usize, last: usize, level: &LevelScratch) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pyramid::passes::{BLURS, PACK, TILES};
+    use crate::pyramid::passes::{DIRECT, LIST_TILES, PLANAR};
     use crate::wgsl::assert_layout;
 
     #[test]
     fn constants_are_those_of_the_shaders() {
-        let rows = crate::plan::ROWS_PER_OCTAVE;
-        let [blurs, tiles, pack] = [BLURS[0], TILES, PACK].map(<[&str]>::concat);
-        for shader in [&blurs, &tiles] {
-            assert!(shader.contains(&format!("const TILE = {TILE}u;")));
-            assert!(shader.contains(&format!("const ROWS_PER_OCTAVE = {rows:.1};")));
-        }
-        // A bit for the frame and for each level, then for the bends; from the other end for each profile.
-        let bends = format!("const BENT_SHIFT = {}u;", crate::plan::MAX_LEVELS + 1);
-        for shared in ["const FLAT_LEVELS = 3u;", &bends] {
-            assert!(tiles.contains(shared) && pack.contains(shared));
-        }
+        let shader = DIRECT.concat();
+        let levels = crate::plan::MAX_LEVELS + 1;
         let profiles = 32 - crate::MAX_PROFILES;
-        assert!(tiles.contains(&format!("const PROFILE_SHIFT = {profiles}u;")));
-        assert!(tiles.contains(&format!("const COLUMNS = {COLUMNS}u;")));
+        for constant in [
+            format!("const TILE = {TILE}u;"),
+            format!("const CLASSES = {CLASSES}u;"),
+            format!("const STEPS = {STEPS}u;"),
+            format!("const GRIDS = {levels}u;"),
+            format!("const LEVELS = {:#x}u;", (1 << levels) - 1),
+            format!("const DIFFICULTY_SHIFT = {levels}u;"),
+            format!("const PROFILE_SHIFT = {profiles}u;"),
+            format!(
+                "const ROWS_PER_OCTAVE = {:.1};",
+                crate::plan::ROWS_PER_OCTAVE
+            ),
+        ] {
+            assert!(shader.contains(&constant), "{constant}");
+        }
     }
 
     #[test]
     fn structs_lie_as_the_shaders_have_them() {
-        let [blurs, tiles] = [BLURS[0], TILES].map(<[&str]>::concat);
         assert_layout!(
-            &blurs,
+            &PLANAR.concat(),
             "View",
             View {
                 has_id,
@@ -353,11 +373,15 @@ mod tests {
                 stride,
                 profiles,
                 first_pixel,
-                size
+                size,
+                planar_limit,
+                general_limit,
+                levels,
+                first_direct
             }
         );
         assert_layout!(
-            &blurs,
+            &PLANAR.concat(),
             "Blur",
             Blur {
                 variance,
@@ -369,28 +393,28 @@ mod tests {
             }
         );
         assert_layout!(
-            &blurs,
+            &PLANAR.concat(),
             "Level",
             Level {
                 blurs,
                 size,
                 scale,
                 rest,
-                coarser
+                coarser,
+                first_tile,
+                tile_count
             }
-        );
-        assert_eq!(
-            crate::wgsl::layout(&tiles, "View"),
-            crate::wgsl::layout(&blurs, "View")
         );
         assert_layout!(
-            &tiles,
-            "Level",
-            Gathering {
-                tiles,
-                below,
-                level
+            &DIRECT.concat(),
+            "Step",
+            Step {
+                variances,
+                level,
+                slot
             }
         );
+        let (_, draw) = crate::wgsl::layout(&LIST_TILES.concat(), "Draw");
+        assert_eq!(draw as u64, DRAW_BYTES);
     }
 }

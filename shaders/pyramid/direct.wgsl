@@ -22,10 +22,10 @@ struct Step {
 
 const STEPS = 12u;
 // Furthest taps, in pixels of a level: at 75° a Gaussian is cut off.
-const REACH = 7.0;
+const REACH = 6.0;
 
-// Weights are max(1 − r²/10v, 0)³, whose variance is v: near to a Gaussian, and 0 beyond √10 σ.
-const CUT = 10.0;
+// Weights are max(1 − r²/8v, 0)², whose variance is v: near to a Gaussian, and 0 beyond √8 σ.
+const CUT = 8.0;
 
 // Weights of single pixels are wider than what they spread by: in square pixels.
 const NARROWEST_IN_SPACE = 0.25;
@@ -33,7 +33,7 @@ const NARROWEST_IN_SPACE = 0.25;
 // What of this variance in square pixels has the variance asked for on a lattice of pixels, where few weigh
 // anything.
 fn lattice_variance(v: f32) -> f32 {
-    return max(v, 0.12 + 0.47 * v);
+    return max(v, 0.13 + 0.37 * v);
 }
 
 // The distances on the plane that weights of a variance have, over those in space: of x², xy and y² in
@@ -57,8 +57,8 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
     let plane = plane_of(pixel, shape);
     let scale = scale_of(plane.m, shape.id);
     let at = vec2f(pixel) + 0.5;
-    let ray_here = view.origin + view.step * at.xyxy;
-    let p = vec3f(ray_here.xy * shape.z + ray_here.zw, shape.z);
+    let here = view.origin + view.step * at.xyxy;
+    let p = vec3f(here.xy * shape.z + here.zw, shape.z);
     let facing = view.step.xy * shape.z + view.step.zw;
     let coarsest = u32(weights[scale.row + view.stride].w);
     var g = Gathered();
@@ -67,13 +67,16 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
         if step.level > coarsest || step.variances.x == 0.0 {
             break;
         }
-        let w0 = weight_at(scale, step.slot);
+        var w0 = weight_at(scale, step.slot);
         var w1 = vec3f(0.0);
         if step.variances.y > 0.0 {
             w1 = weight_at(scale, step.slot + 1u);
         }
-        let has_second = any(w1 > vec3f(NEGLIGIBLE_WEIGHT));
-        if !has_second && all(w0 <= vec3f(NEGLIGIBLE_WEIGHT)) {
+        let has_second = any(w1 > vec3f(0.004));
+        if !has_second {
+            w0 += w1;
+        }
+        if !has_second && all(w0 <= vec3f(0.004)) {
             g.light += w0 * e;
             g.weight += w0;
             continue;
@@ -92,26 +95,30 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
         let center = at / side - 0.5;
         let first = max(vec2i(ceil(center - reach)), vec2i(0));
         let last = min(vec2i(floor(center + reach)), vec2i(textureDimensions(shapes, step.level)) - 1);
+        // p.xy = u·z + v along a row: where it begins, and for a step of a pixel.
+        let step_x = view.step.xz * side;
+        let first_x = view.origin.xz + 0.5 * step_x - vec2f(0.0, p.x);
+        let first_y = view.origin.yw + 0.5 * view.step.yw * side - vec2f(0.0, p.y);
         var sum0 = vec4f(0.0);
         var sum1 = vec4f(0.0);
         for (var y = first.y; y <= last.y; y++) {
             let dy = f32(y) - center.y;
             let half = reach.x * sqrt(saturate(1.0 - dy * dy / (reach.y * reach.y)));
             let to = min(i32(floor(center.x + half)), last.x);
+            let row_y = first_y + view.step.yw * (side * f32(y));
+            // 1 − k₀₀ dx² − k₀₁ dx dy − k₁₁ dy² of each of the two.
+            let k00 = vec2f(k0.x, k1.x);
+            let k01 = vec2f(k0.y, k1.y) * dy;
+            let rest = 1.0 - vec2f(k0.z, k1.z) * (dy * dy);
             for (var x = max(i32(ceil(center.x - half)), 0); x <= to; x++) {
-                let q = vec2i(x, y);
-                let there = textureLoad(shapes, q, step.level).rg;
-                if there.x >> 24u != shape.id {
-                    continue;
-                }
-                let light = textureLoad(lights, q, step.level);
-                let d = vec2f(f32(x) - center.x, dy);
+                let there = textureLoad(shapes, vec2i(x, y), step.level).rg;
+                let light = textureLoad(lights, vec2i(x, y), step.level);
                 let z = bitcast<f32>(there.y);
-                let ray_there = view.origin + view.step * ((vec2f(q) + 0.5) * side).xyxy;
-                let off = vec3f(ray_there.xy * z + ray_there.zw, z) - p;
-                let square = vec3f(d.x * d.x, d.x * d.y, d.y * d.y);
-                let near = saturate(1.0 - dot(off, off) * in_space - vec2f(dot(square, k0), dot(square, k1)));
-                let weight = near * near * near;
+                let row_x = first_x + step_x * f32(x);
+                let off = vec3f(row_x.x * z + row_x.y, row_y.x * z + row_y.y, z - p.z);
+                let dx = f32(x) - center.x;
+                let near = saturate(rest - dx * (k00 * dx + k01) - dot(off, off) * in_space);
+                let weight = select(vec2f(0.0), near * near, there.x >> 24u == shape.id);
                 sum0 += weight.x * light;
                 sum1 += weight.y * light;
             }
@@ -134,7 +141,6 @@ fn fs_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
     if shape.id == 0u || share <= 0.0 {
         discard;
     }
-    let here = textureLoad(here_light, pixel, 0);
-    let e = here.rgb / max(here.a, 1e-6);
+    let e = light_of(textureLoad(here_light, pixel, 0));
     return scattered(pixel, gathered(pixel, e, shape), e, share);
 }

@@ -68,7 +68,7 @@ fn off_plane(bend: f32) -> vec4f {
 fn tap(i: i32, j: i32, exponents: vec4f) {
     let there = neighbour(i, j);
     // No weight grows beyond the middle's.
-    let weights = exp(min(-exponents - off_plane(there.bend), vec4f(0.0)));
+    let weights = weights_of(min(-exponents - off_plane(there.bend), vec4f(0.0)));
     add(there, center.blurs.colors * weights);
 }
 
@@ -192,6 +192,18 @@ fn fs_level(@builtin(position) at: vec4f) -> @location(0) vec4f {
     if shape.id == 0u {
         return vec4f(0.0);
     }
-    let here = textureLoad(here_light, pixel, 0);
-    return mean_of(gathered(pixel, here.rgb / max(here.a, 1e-6), shape));
+    let e = light_of(textureLoad(here_light, pixel, 0));
+    return mean_of(gathered(pixel, e, shape));
+}
+
+@fragment
+fn fs_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    let pixel = vec2i(at.xy) - vec2i(view.first_pixel);
+    let shape = unpacked(textureLoad(here_shape, pixel, 0).rg);
+    let share = share_at(pixel);
+    if shape.id == 0u || share <= 0.0 {
+        discard;
+    }
+    let e = light_of(textureLoad(here_light, pixel, 0));
+    return scattered(pixel, gathered(pixel, e, shape), e, share);
 }
