@@ -87,6 +87,15 @@ pub(crate) const READ: BindingType = buffer_type(BufferBindingType::Storage { re
 /// A buffer that shaders write.
 pub(crate) const WRITE: BindingType = buffer_type(BufferBindingType::Storage { read_only: false });
 
+/// A texture of a format that shaders write.
+pub(crate) const fn stored(format: TextureFormat) -> BindingType {
+    BindingType::StorageTexture {
+        access: wgpu::StorageTextureAccess::WriteOnly,
+        format,
+        view_dimension: wgpu::TextureViewDimension::D2,
+    }
+}
+
 const fn texture_type(sample_type: TextureSampleType) -> BindingType {
     BindingType::Texture {
         sample_type,

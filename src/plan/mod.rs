@@ -21,9 +21,9 @@ use crate::{Error, Profile, validate};
 use kernels::{KERNELS, Kernels};
 pub(crate) use kernels::{Kinds, Shape, own_blur};
 use stored::Stored;
-pub(crate) use weights::Weights;
 #[cfg(test)]
-pub(crate) use weights::{MAX_LEVELS, ROWS_PER_OCTAVE};
+pub(crate) use weights::ROWS_PER_OCTAVE;
+pub(crate) use weights::{MAX_LEVELS, Weights};
 
 /// 1/255, the error that a result of eight bits a channel can show, in units of white.
 pub const DEFAULT_MAX_ERROR: f32 = 1.0 / 255.0;

@@ -10,7 +10,7 @@ use super::kernels::Kernels;
 /// Rows to an octave of scale; between two of them weights are interpolated.
 pub(crate) const ROWS_PER_OCTAVE: f64 = 6.0;
 
-/// How many rows a tile looks beyond that of its scale, rounded up; as in tiles.wgsl.
+/// How many rows a tile looks beyond that of its scale, rounded up; as in pack.wgsl.
 const ROWS_BEYOND: f32 = 2.0;
 
 /// Levels that weights may be for.
@@ -150,7 +150,7 @@ impl Weights {
         sum
     }
 
-    /// The row that tiles.wgsl asks for the level of a tile.
+    /// The row that pack.wgsl asks for the level of a tile.
     pub(crate) fn tile_row(&self, px_per_mm: f32) -> usize {
         let rows = (px_per_mm.log2() - self.first_octave()) * ROWS_PER_OCTAVE as f32;
         let row = rows.ceil() + ROWS_BEYOND;

@@ -1,5 +1,6 @@
-//! Scattering by a plan, over a pyramid of the frame: drives `shaders/tiles.wgsl`, and the passes
-//! over tiles that follow `shaders/surface.wgsl`.
+//! Scattering by a plan, over a pyramid of the frame: drives `shaders/pyramid/`. A compute pass packs the frame
+//! and says what its tiles hold, another lists those of each level by their class; all others are drawn over
+//! these lists.
 
 mod passes;
 mod scratch;
@@ -14,8 +15,13 @@ use crate::gpu::{self, Recorder};
 use crate::optics::Optics;
 use crate::plan::Weights;
 use crate::{Error, Frame, Output};
-use passes::{Compute, LIGHT, OverTiles, Passes};
-use scratch::{COLUMNS, DRAW_BYTES, LevelScratch, Scratch};
+use passes::{LIGHT, OverTiles, Passes};
+use scratch::{CLASSES, DRAW_BYTES, Scratch};
+
+/// How far planar blurs may be off in a tile by its looks (`doubt` of list_tiles.wgsl), over the error of the
+/// plan, for it to be planar, and to be general. Found on heads: beyond these, errors grow; below, only the work.
+const PLANAR_LIMIT: f32 = 180.0;
+const GENERAL_LIMIT: f32 = 150.0;
 
 /// The passes of a plan, and its weights.
 #[derive(Debug)]
@@ -44,11 +50,10 @@ struct Groups {
     weights: Buffer,
     read: Textures,
     viewport: Option<Viewport>,
-    mark: BindGroup,
-    gather: Vec<BindGroup>,
     pack: BindGroup,
+    list_tiles: BindGroup,
     /// Of each level from 1 on.
-    halve: Vec<BindGroup>,
+    downsample: Vec<BindGroup>,
     level: Vec<BindGroup>,
     frame: BindGroup,
     copy: BindGroup,
@@ -150,6 +155,10 @@ impl Pyramid {
             profiles: plan.profiles.len() as u32,
             first_pixel: frame.rectangle().first(),
             size: size.into(),
+            planar_limit: PLANAR_LIMIT * plan.predicted_error(),
+            general_limit: GENERAL_LIMIT * plan.predicted_error(),
+            levels: view.scratch.levels.len() as u32 - 1,
+            first_direct: view.scratch.tile_count,
         };
         queue.write_buffer(&view.scratch.view, 0, bytemuck::bytes_of(&numbers));
         let read = Textures {
@@ -194,7 +203,7 @@ impl Pyramid {
             let mut resources = vec![
                 (0, view.clone()),
                 (1, levels[l].settings.as_entire_binding()),
-                (2, levels[l].list.as_entire_binding()),
+                (2, scratch.list.as_entire_binding()),
                 (3, self.weights.as_entire_binding()),
                 (7, Texture(&levels[l].light)),
                 (8, Texture(&levels[l].shape)),
@@ -205,62 +214,52 @@ impl Pyramid {
             if l == 0 {
                 resources.push((4, Texture(&read.strength)));
                 resources.push((5, Texture(&read.albedo)));
+                resources.push((13, scratch.steps.as_entire_binding()));
+                resources.push((14, Texture(&scratch.lights)));
+                resources.push((15, Texture(&scratch.shapes)));
             }
             group(&pass.layout, &resources)
         };
-        let gather = |l: usize| {
-            let below = match l {
-                0 => &scratch.marked,
-                _ => &levels[l - 1].marked,
-            };
-            let resources = [
-                (5, levels[l].gathering.as_entire_binding()),
-                (6, below.as_entire_binding()),
-                (7, levels[l].marked.as_entire_binding()),
-                (8, levels[l].draws.as_entire_binding()),
-                (9, levels[l].list.as_entire_binding()),
-                (10, Texture(&base.shape)),
-            ];
-            group(&passes.gather.layout, &resources)
-        };
-        let halve = |l: usize| {
+        let downsample = |l: usize| {
             let resources = [
                 (0, view.clone()),
                 (1, levels[l].settings.as_entire_binding()),
-                (2, levels[l].list.as_entire_binding()),
+                (2, scratch.list.as_entire_binding()),
                 (7, Texture(&levels[l - 1].light)),
                 (8, Texture(&levels[l - 1].shape)),
                 (12, Sampler(&self.linear)),
             ];
-            group(&passes.halve.layout, &resources)
+            group(&passes.downsample.layout, &resources)
         };
         Groups {
             weights: self.weights.clone(),
             viewport,
-            mark: group(
-                &passes.mark.layout,
-                &[
-                    (0, view.clone()),
-                    (1, Texture(&read.depth)),
-                    (2, Texture(&read.profile_id)),
-                    (3, self.weights.as_entire_binding()),
-                    (4, scratch.marked.as_entire_binding()),
-                ],
-            ),
-            gather: (0..levels.len()).map(gather).collect(),
             pack: group(
                 &passes.pack.layout,
                 &[
                     (0, view.clone()),
                     (1, base.settings.as_entire_binding()),
-                    (2, base.list.as_entire_binding()),
+                    (3, self.weights.as_entire_binding()),
                     (4, Texture(&read.irradiance)),
                     (5, Texture(&read.depth)),
                     (6, Texture(&read.profile_id)),
-                    (11, scratch.marked.as_entire_binding()),
+                    (7, Texture(&base.light)),
+                    (8, Texture(&base.shape)),
+                    (9, scratch.grids.as_entire_binding()),
+                    (10, scratch.contents.as_entire_binding()),
                 ],
             ),
-            halve: (1..levels.len()).map(halve).collect(),
+            list_tiles: group(
+                &passes.list_tiles.layout,
+                &[
+                    (0, view.clone()),
+                    (9, scratch.grids.as_entire_binding()),
+                    (10, scratch.contents.as_entire_binding()),
+                    (11, scratch.draws.as_entire_binding()),
+                    (12, scratch.list.as_entire_binding()),
+                ],
+            ),
+            downsample: (1..levels.len()).map(downsample).collect(),
             level: (1..levels.len()).map(|l| blur(&passes.level, l)).collect(),
             frame: blur(&passes.frame, 0),
             copy: group(
@@ -282,35 +281,30 @@ impl Pyramid {
             return;
         };
         let passes = &self.passes;
-        for level in &scratch.levels {
-            forget_tiles(recorder, level);
-        }
-        recorder.encoder.clear_buffer(&scratch.marked, 0, None);
+        let draws = scratch.draws.size();
+        let encoder = &mut *recorder.encoder;
+        encoder.copy_buffer_to_buffer(&scratch.no_draws, 0, &scratch.draws, 0, draws);
+        encoder.clear_buffer(&scratch.contents, 0, None);
+        // Nothing is drawn: it clears what is packed.
+        recorder.draw(
+            "subsurface::pyramid clear",
+            &[&base.light, &base.shape],
+            false,
+        );
         {
-            let mut pass = recorder.dispatch("subsurface::pyramid tiles");
-            pass.set_pipeline(&passes.mark.pipeline);
-            pass.set_bind_group(0, &groups.mark, &[]);
-            pass.dispatch_workgroups(base.size[0].div_ceil(COLUMNS), base.tiles[1], 1);
-            // All of the frame's; which of them are simple shows when they are packed.
-            gather(&mut pass, &passes.gather, &groups.gather[0], base);
+            let [x, y] = base.tiles;
+            let mut pass = recorder.dispatch("subsurface::pyramid pack");
+            pass.set_pipeline(&passes.pack.pipeline);
+            pass.set_bind_group(0, &groups.pack, &[]);
+            pass.dispatch_workgroups(x, y, 1);
+            pass.set_pipeline(&passes.list_tiles.pipeline);
+            pass.set_bind_group(0, &groups.list_tiles, &[]);
+            pass.dispatch_workgroups(x.div_ceil(8), y.div_ceil(8), scratch.levels.len() as u32);
         }
-        {
-            let targets = [&base.light, &base.shape];
-            let mut pass = recorder.draw("subsurface::pyramid pack", &targets, false);
-            over_tiles(&mut pass, &passes.pack, &groups.pack, base);
-        }
-        forget_tiles(recorder, base);
-        {
-            let mut pass = recorder.dispatch("subsurface::pyramid simple tiles");
-            for (group, level) in groups.gather.iter().zip(&scratch.levels) {
-                gather(&mut pass, &passes.gather, group, level);
-            }
-        }
-        for ((group, level), l) in groups.halve.iter().zip(coarser).zip(1..) {
-            let label = format!("subsurface::pyramid halve to level {l}");
-            let targets = [&level.light, &level.shape];
-            let mut pass = recorder.draw(&label, &targets, false);
-            over_tiles(&mut pass, &passes.halve, group, level);
+        for ((group, level), l) in groups.downsample.iter().zip(coarser).zip(1..) {
+            let label = format!("subsurface::pyramid downsample to level {l}");
+            let mut pass = recorder.draw(&label, &[&level.light, &level.shape], false);
+            over_tiles(&mut pass, &passes.downsample, group, scratch, l);
         }
         for l in (1..scratch.levels.len()).rev() {
             let (group, level) = (&groups.level[l - 1], &scratch.levels[l]);
@@ -318,7 +312,7 @@ impl Pyramid {
             let mut pass = recorder.draw(&label, &[scratch.mean(l)], false);
             let [x, y] = level.size.map(|s| s as f32);
             pass.set_viewport(0.0, 0.0, x, y, 0.0, 1.0);
-            over_tiles(&mut pass, &passes.level, group, level);
+            over_tiles(&mut pass, &passes.level, group, scratch, l);
         }
         let keeps = self.output.adds() || groups.viewport.is_some();
         let mut pass = recorder.draw("subsurface::pyramid blur frame", &[output], keeps);
@@ -330,34 +324,21 @@ impl Pyramid {
             pass.set_bind_group(0, &groups.copy, &[]);
             pass.draw(0..3, 0..1);
         }
-        over_tiles(&mut pass, &passes.frame, &groups.frame, base);
+        over_tiles(&mut pass, &passes.frame, &groups.frame, scratch, 0);
     }
 }
 
-fn forget_tiles(recorder: &mut Recorder, level: &LevelScratch) {
-    for i in 0..2 {
-        let draw = i * DRAW_BYTES + 4;
-        recorder.encoder.clear_buffer(&level.draws, draw, Some(4));
-    }
-}
-
-fn gather(pass: &mut wgpu::ComputePass, to: &Compute, group: &BindGroup, level: &LevelScratch) {
-    let [x, y] = level.tiles;
-    pass.set_pipeline(&to.pipeline);
-    pass.set_bind_group(0, group, &[]);
-    pass.dispatch_workgroups(x.div_ceil(8), y.div_ceil(8), 1);
-}
-
-/// Draws the simple tiles of a level by the first, the others by the second.
+/// Draws the planar tiles of a level by the first, the others by the second.
 fn over_tiles(
     pass: &mut wgpu::RenderPass,
     draws: &OverTiles,
     group: &BindGroup,
-    level: &LevelScratch,
+    scratch: &Scratch,
+    l: usize,
 ) {
     pass.set_bind_group(0, group, &[]);
-    for (i, pipeline) in (0..).zip(&draws.pipelines) {
+    for (i, pipeline) in (CLASSES * l as u64..).zip(&draws.pipelines) {
         pass.set_pipeline(pipeline);
-        pass.draw_indirect(&level.draws, i * DRAW_BYTES);
+        pass.draw_indirect(&scratch.draws, i * DRAW_BYTES);
     }
 }

@@ -14,17 +14,21 @@ pub(super) const LIGHT: TextureFormat = TextureFormat::Rgba16Float;
 /// Format of what tells where a surface is.
 pub(super) const SHAPE: TextureFormat = TextureFormat::Rg32Uint;
 
-const SURFACE: &str = include_str!("../../shaders/surface.wgsl");
-pub(super) const TILES: &[&str] = &[include_str!("../../shaders/tiles.wgsl")];
-pub(super) const PACK: &[&str] = &[SURFACE, include_str!("../../shaders/pack.wgsl")];
-const HALVE: &[&str] = &[SURFACE, include_str!("../../shaders/halve.wgsl")];
-const COPY: &[&str] = &[SURFACE, include_str!("../../shaders/copy.wgsl")];
-const BLUR: &str = include_str!("../../shaders/blur.wgsl");
-/// The blurs where all is simple, and elsewhere.
-pub(super) const BLURS: [&[&str]; 2] = [
-    &[SURFACE, BLUR, include_str!("../../shaders/simple.wgsl")],
-    &[SURFACE, BLUR, include_str!("../../shaders/careful.wgsl")],
-];
+/// A file of the pyramid's shaders.
+macro_rules! wgsl {
+    ($name:literal) => {
+        include_str!(concat!("../../shaders/pyramid/", $name, ".wgsl"))
+    };
+}
+const SURFACE: &str = wgsl!("surface");
+const BLUR: &str = wgsl!("blur");
+pub(super) const PACK: &[&str] = &[SURFACE, wgsl!("pack")];
+pub(super) const LIST_TILES: &[&str] = &[SURFACE, wgsl!("list_tiles")];
+const DOWNSAMPLE: &[&str] = &[SURFACE, wgsl!("downsample")];
+pub(super) const PLANAR: &[&str] = &[SURFACE, BLUR, wgsl!("planar")];
+const GENERAL: &[&str] = &[SURFACE, BLUR, wgsl!("general")];
+pub(super) const DIRECT: &[&str] = &[SURFACE, BLUR, wgsl!("direct")];
+const COPY: &[&str] = &[SURFACE, wgsl!("copy")];
 
 #[derive(Debug)]
 pub(super) struct Compute {
@@ -32,51 +36,36 @@ pub(super) struct Compute {
     pub pipeline: ComputePipeline,
 }
 
-/// Pipelines of one layout: for simple tiles, and for the others.
+/// Pipelines over the tiles of a level, by their class: planar, general, and on the frame direct.
 #[derive(Debug)]
 pub(super) struct OverTiles {
     pub layout: BindGroupLayout,
-    pub pipelines: [RenderPipeline; 2],
+    pub pipelines: Vec<RenderPipeline>,
 }
 
 /// All passes.
 #[derive(Debug)]
 pub(super) struct Passes {
-    pub mark: Compute,
-    pub gather: Compute,
-    pub pack: OverTiles,
-    pub halve: OverTiles,
+    pub pack: Compute,
+    pub list_tiles: Compute,
+    pub downsample: OverTiles,
     pub level: OverTiles,
     pub frame: OverTiles,
     pub copy_layout: BindGroupLayout,
     pub copy: RenderPipeline,
 }
 
-/// What the bindings of tiles.wgsl are.
-fn tiles_binding(binding: u32) -> (u32, BindingType) {
-    let ty = match binding {
-        0 | 5 => UNIFORM,
-        1 => FLOATS,
-        2 | 10 => UINTS,
-        3 | 6 => READ,
-        _ => WRITE,
-    };
-    (binding, ty)
-}
-
 impl Passes {
     pub fn new(device: &Device, plan: &Weights, output: Output) -> Self {
-        let tiles = gpu::module(device, "subsurface::pyramid tiles", TILES);
-        let compute = |entry: &str, bindings: &[u32]| {
+        let compute = |entry: &str, files: &[&str], bindings: &[(u32, BindingType)]| {
             let label = format!("subsurface::pyramid {entry}");
-            let bindings: Vec<_> = bindings.iter().map(|b| tiles_binding(*b)).collect();
-            let layout = gpu::layout(device, &label, ShaderStages::COMPUTE, &bindings);
-            let pipeline = gpu::compute_pipeline(device, &label, &tiles, entry, &layout);
+            let module = gpu::module(device, &label, files);
+            let layout = gpu::layout(device, &label, ShaderStages::COMPUTE, bindings);
+            let pipeline = gpu::compute_pipeline(device, &label, &module, entry, &layout);
             Compute { layout, pipeline }
         };
         let over_tiles = |entry: &str,
-                          vertex: [&str; 2],
-                          files: [&[&str]; 2],
+                          classes: &[(&str, &[&str])],
                           bindings: &[(u32, BindingType)],
                           targets: &[TextureFormat],
                           kinds: Option<&Kinds>| {
@@ -88,8 +77,8 @@ impl Passes {
                 _ => targets.iter().map(|t| Some((*t).into())).collect(),
             };
             let flag = |on| f64::from(u8::from(on));
-            let pipelines = [0, 1].map(|careful| {
-                let mut constants = vec![("CAREFUL", careful as f64)];
+            let pipeline = |(class, (vertex, files)): (u32, &(&str, &[&str]))| {
+                let mut constants = vec![("CLASS", class.into())];
                 if let Some(kinds) = kinds {
                     constants.extend([
                         ("BLURS", kinds.variances_px2.len() as f64),
@@ -99,11 +88,11 @@ impl Passes {
                         ("DIFFERENCE", flag(output.adds())),
                     ]);
                 }
-                let module: ShaderModule = gpu::module(device, &label, files[careful]);
+                let module: ShaderModule = gpu::module(device, &label, files);
                 gpu::Draw {
                     label: &label,
                     module: &module,
-                    vertex: vertex[careful],
+                    vertex,
                     fragment: entry,
                     layout: &layout,
                     topology: PrimitiveTopology::TriangleStrip,
@@ -111,10 +100,10 @@ impl Passes {
                     constants: &constants,
                 }
                 .pipeline(device)
-            });
+            };
+            let pipelines = (0..).zip(classes).map(pipeline).collect();
             OverTiles { layout, pipelines }
         };
-        let surface = [LIGHT, SHAPE];
         let level = [
             (0, UNIFORM),
             (1, UNIFORM),
@@ -128,7 +117,13 @@ impl Passes {
         ];
         let frame: Vec<_> = level
             .into_iter()
-            .chain([(4, FLOATS), (5, FLOATS)])
+            .chain([
+                (4, FLOATS),
+                (5, FLOATS),
+                (13, UNIFORM),
+                (14, FLOATS),
+                (15, UINTS),
+            ])
             .collect();
         let copy_label = "subsurface::pyramid fs_copy";
         let copy_layout = gpu::layout(
@@ -138,28 +133,36 @@ impl Passes {
             &[(0, UNIFORM), (4, FLOATS), (5, FLOATS)],
         );
         Self {
-            mark: compute("mark", &[0, 1, 2, 3, 4]),
-            gather: compute("gather", &[5, 6, 7, 8, 9, 10]),
-            pack: over_tiles(
-                "fs_pack",
-                ["vs_tile"; 2],
-                [PACK; 2],
+            pack: compute(
+                "pack_tile",
+                PACK,
                 &[
                     (0, UNIFORM),
                     (1, UNIFORM),
-                    (2, READ),
+                    (3, READ),
                     (4, FLOATS),
                     (5, FLOATS),
                     (6, UINTS),
-                    (11, WRITE),
+                    (7, gpu::stored(LIGHT)),
+                    (8, gpu::stored(SHAPE)),
+                    (9, UNIFORM),
+                    (10, WRITE),
                 ],
-                &surface,
-                None,
             ),
-            halve: over_tiles(
-                "fs_halve",
-                ["vs_tile"; 2],
-                [HALVE; 2],
+            list_tiles: compute(
+                "list_tiles",
+                LIST_TILES,
+                &[
+                    (0, UNIFORM),
+                    (9, UNIFORM),
+                    (10, READ),
+                    (11, WRITE),
+                    (12, WRITE),
+                ],
+            ),
+            downsample: over_tiles(
+                "fs_downsample",
+                &[("vs_tile", DOWNSAMPLE); 2],
                 &[
                     (0, UNIFORM),
                     (1, UNIFORM),
@@ -168,21 +171,23 @@ impl Passes {
                     (8, UINTS),
                     (12, SAMPLER),
                 ],
-                &surface,
+                &[LIGHT, SHAPE],
                 None,
             ),
             level: over_tiles(
                 "fs_level",
-                ["vs_corner", "vs_tile"],
-                BLURS,
+                &[("vs_corner", PLANAR), ("vs_tile", GENERAL)],
                 &level,
                 &[LIGHT],
                 Some(&plan.kernels.coarse),
             ),
             frame: over_tiles(
                 "fs_frame",
-                ["vs_corner", "vs_tile"],
-                BLURS,
+                &[
+                    ("vs_corner", PLANAR),
+                    ("vs_tile", GENERAL),
+                    ("vs_tile", DIRECT),
+                ],
                 &frame,
                 &[],
                 Some(&plan.kernels.fine),

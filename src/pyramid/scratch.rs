@@ -1,17 +1,15 @@
 //! What a frame of one size needs, for one plan.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{UVec2, Vec2, Vec4};
+use glam::{UVec2, UVec4, Vec2, Vec4};
 use wgpu::{Buffer, BufferUsages, Device, Queue, TextureView};
 
 use super::passes::{LIGHT, SHAPE};
 use crate::gpu;
-use crate::plan::{Shape, Weights, own_blur};
+use crate::plan::{MAX_LEVELS, Shape, Weights, own_blur};
 
 /// Side of a tile, in pixels of its level.
 pub(super) const TILE: u32 = 8;
-/// Columns of pixels that a workgroup marks the tiles of.
-pub(super) const COLUMNS: u32 = 64;
 
 /// `View` of the shaders.
 #[repr(C)]
@@ -30,6 +28,10 @@ pub(super) struct View {
     pub profiles: u32,
     pub first_pixel: UVec2,
     pub size: UVec2,
+    pub planar_limit: f32,
+    pub general_limit: f32,
+    pub levels: u32,
+    pub first_direct: u32,
 }
 
 /// `Blur` of surface.wgsl.
@@ -54,29 +56,50 @@ struct Level {
     scale: f32,
     rest: u32,
     coarser: u32,
-    pad: [u32; 3],
-}
-
-/// `Level` of tiles.wgsl.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct Gathering {
-    tiles: UVec2,
-    below: UVec2,
-    level: u32,
+    first_tile: u32,
+    tile_count: u32,
     pad: u32,
 }
 
-/// Bytes of a `Draw` of tiles.wgsl; each list has two, of simple tiles and of the others.
+/// `Step` of direct.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Default, Pod, Zeroable)]
+struct Step {
+    variances: [f32; 2],
+    level: u32,
+    slot: u32,
+}
+
+/// Gaussians of the frame in twos, then a step for each level.
+pub(super) const STEPS: usize = 2 + MAX_LEVELS;
+
+/// Bytes of a `Draw` of list_tiles.wgsl.
 pub(super) const DRAW_BYTES: u64 = 16;
+/// Draws of a level, one for each class of tiles.
+pub(super) const CLASSES: u64 = 3;
+/// Words of what a tile holds.
+const CONTENTS: u32 = 3;
 
 #[derive(Debug)]
 pub(super) struct Scratch {
     pub size: [u32; 2],
     pub view: Buffer,
-    /// What the frame's tiles hold, and where they bend.
-    pub marked: Buffer,
+    /// Columns and rows of tiles of each level, and where they begin.
+    pub grids: Buffer,
+    pub steps: Buffer,
+    /// What each tile holds.
+    pub contents: Buffer,
+    /// Tiles to be drawn.
+    pub list: Buffer,
+    pub draws: Buffer,
+    /// What `draws` begins as.
+    pub no_draws: Buffer,
+    /// All levels of light, and of where the surface is.
+    pub lights: TextureView,
+    pub shapes: TextureView,
     pub levels: Vec<LevelScratch>,
+    /// Tiles of all levels.
+    pub tile_count: u32,
     /// Means of level 1 and of level 2, and by turns of those above.
     pub means: [TextureView; 2],
 }
@@ -85,24 +108,33 @@ pub(super) struct Scratch {
 pub(super) struct LevelScratch {
     pub size: [u32; 2],
     pub tiles: [u32; 2],
-    pub gathering: Buffer,
+    pub first_tile: u32,
     pub settings: Buffer,
     pub light: TextureView,
     pub shape: TextureView,
-    pub marked: Buffer,
-    pub list: Buffer,
-    pub draws: Buffer,
 }
 
 /// Levels above a frame of this size: one of a single pixel has nothing above it.
 fn level_count(size: [u32; 2], plan: &Weights) -> usize {
-    let largest = size[0].max(size[1]);
-    plan.levels
-        .min(largest.next_power_of_two().ilog2() as usize)
+    let [width, height] = padded(size);
+    plan.levels.min(width.max(height).ilog2() as usize)
 }
 
+/// The frame, with as many columns and rows more as make the first levels whole.
+fn padded(size: [u32; 2]) -> [u32; 2] {
+    size.map(|s| s.next_multiple_of(1 << WHOLE_LEVELS))
+}
+
+/// Levels whose pixels cover all of the frame; those of the others leave less than one of them out.
+const WHOLE_LEVELS: u32 = 4;
+
 fn size_of_level(size: [u32; 2], l: usize) -> [u32; 2] {
-    size.map(|s| s.div_ceil(1 << l))
+    padded(size).map(|s| (s >> l).max(1))
+}
+
+fn tiles_of_level(size: [u32; 2], l: usize) -> [u32; 2] {
+    // Of the tiles of the frame, which all have a place in each level.
+    size.map(|s| s.div_ceil(TILE).div_ceil(1 << l))
 }
 
 fn count([x, y]: [u32; 2]) -> u64 {
@@ -111,18 +143,13 @@ fn count([x, y]: [u32; 2]) -> u64 {
 
 /// Bytes of the textures and lists of a frame of this size.
 pub(super) fn bytes(size: [u32; 2], plan: &Weights) -> u64 {
-    let tiles = |size: [u32; 2]| count(size.map(|s| s.div_ceil(TILE)));
     let of_level = |l| {
-        let size = size_of_level(size, l);
-        // Light and shape, marks and a list.
-        16 * count(size) + 8 * tiles(size)
+        // Light and shape; what tiles hold, and their list.
+        16 * count(size_of_level(size, l)) + 16 * count(tiles_of_level(size, l))
     };
     let levels: u64 = (0..=level_count(size, plan)).map(of_level).sum();
-    let means: u64 = [1, 2]
-        .map(|l| 8 * count(size_of_level(size, l)))
-        .iter()
-        .sum();
-    levels + means + 4 * tiles(size)
+    let means = [1, 2].map(|l| 8 * count(size_of_level(size, l)));
+    levels + means.iter().sum::<u64>() + 4 * count(tiles_of_level(size, 0))
 }
 
 impl Scratch {
@@ -135,58 +162,97 @@ impl Scratch {
                 mapped_at_creation: false,
             })
         };
-        let levels = level_count(size, plan);
-        let size_of_level = |l| size_of_level(size, l);
-        let tiles_of_frame = size.map(|s| s.div_ceil(TILE));
-        let frame_tiles = tiles_of_frame[0] * tiles_of_frame[1];
-        let mut below = tiles_of_frame;
-        let levels: Vec<_> = (0..=levels)
+        let last = level_count(size, plan);
+        let mips = |label: &str, format, usage| {
+            let [width, height] = padded(size);
+            device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(label),
+                size: wgpu::Extent3d {
+                    width,
+                    height,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1 + last as u32,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format,
+                usage,
+                view_formats: &[],
+            })
+        };
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::STORAGE_BINDING;
+        let lights = mips("subsurface::pyramid light", LIGHT, usage);
+        let shapes = mips("subsurface::pyramid shape", SHAPE, usage);
+        let mip = |texture: &wgpu::Texture, l: usize| {
+            texture.create_view(&wgpu::TextureViewDescriptor {
+                base_mip_level: l as u32,
+                mip_level_count: Some(1),
+                ..Default::default()
+            })
+        };
+        let mut first_tile = 0;
+        let levels: Vec<_> = (0..=last)
             .map(|l| {
-                let size = size_of_level(l);
-                let tiles = size.map(|s| s.div_ceil(TILE));
-                let count = tiles[0] * tiles[1];
                 let level = LevelScratch {
-                    size,
-                    tiles,
-                    gathering: gpu::uniform_buffer::<Gathering>(
-                        device,
-                        "subsurface::pyramid tiles of a level",
-                    ),
+                    size: if l == 0 { size } else { size_of_level(size, l) },
+                    tiles: tiles_of_level(size, l),
+                    first_tile,
                     settings: gpu::uniform_buffer::<Level>(device, "subsurface::pyramid level"),
-                    light: gpu::scratch_texture(device, "subsurface::pyramid light", size, LIGHT),
-                    shape: gpu::scratch_texture(device, "subsurface::pyramid shape", size, SHAPE),
-                    marked: words("subsurface::pyramid marks", count, BufferUsages::empty()),
-                    list: words("subsurface::pyramid tiles", count, BufferUsages::empty()),
-                    draws: words(
-                        "subsurface::pyramid draws",
-                        8,
-                        BufferUsages::INDIRECT | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
-                    ),
+                    light: mip(&lights, l),
+                    shape: mip(&shapes, l),
                 };
-                let draws = [4u32, 0, 0, 0, 4, 0, 0, 0];
-                queue.write_buffer(&level.draws, 0, bytemuck::bytes_of(&draws));
-                let gathering = Gathering {
-                    tiles: tiles.into(),
-                    below: below.into(),
-                    level: l as u32,
-                    pad: 0,
-                };
-                queue.write_buffer(&level.gathering, 0, bytemuck::bytes_of(&gathering));
-                below = tiles;
+                first_tile += level.tiles[0] * level.tiles[1];
                 level
             })
             .collect();
-        let mean =
-            |l| gpu::scratch_texture(device, "subsurface::pyramid mean", size_of_level(l), LIGHT);
+        let mut grids = [UVec4::ZERO; 1 + MAX_LEVELS];
+        for (grid, level) in grids.iter_mut().zip(&levels) {
+            *grid = UVec4::new(level.tiles[0], level.tiles[1], level.first_tile, 0);
+        }
+        let grids_buffer =
+            gpu::uniform_buffer::<[UVec4; 1 + MAX_LEVELS]>(device, "subsurface::pyramid grids");
+        queue.write_buffer(&grids_buffer, 0, bytemuck::bytes_of(&grids));
+        let no_draws: Vec<u32> = [4u32, 0, 0, 0].repeat(CLASSES as usize * levels.len());
+        let mean = |l| {
+            gpu::scratch_texture(
+                device,
+                "subsurface::pyramid mean",
+                size_of_level(size, l),
+                LIGHT,
+            )
+        };
         Self {
             size,
             view: gpu::uniform_buffer::<View>(device, "subsurface::pyramid view"),
-            marked: words(
-                "subsurface::pyramid marks",
-                frame_tiles,
+            grids: grids_buffer,
+            steps: gpu::uniform_buffer::<[Step; STEPS]>(device, "subsurface::pyramid steps"),
+            contents: words(
+                "subsurface::pyramid contents of tiles",
+                CONTENTS * first_tile,
                 BufferUsages::COPY_DST,
             ),
+            list: words(
+                "subsurface::pyramid tiles",
+                first_tile + levels[0].tiles[0] * levels[0].tiles[1],
+                BufferUsages::empty(),
+            ),
+            draws: words(
+                "subsurface::pyramid draws",
+                no_draws.len() as u32,
+                BufferUsages::INDIRECT | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
+            ),
+            no_draws: gpu::filled_buffer(
+                device,
+                "subsurface::pyramid no draws",
+                bytemuck::cast_slice(&no_draws),
+                BufferUsages::COPY_SRC,
+            ),
+            lights: lights.create_view(&Default::default()),
+            shapes: shapes.create_view(&Default::default()),
             levels,
+            tile_count: first_tile,
             means: [mean(1), mean(2)],
         }
     }
@@ -195,9 +261,10 @@ impl Scratch {
     pub fn set_plan(&self, queue: &Queue, plan: &Weights) {
         let last = self.levels.len() - 1;
         for (l, level) in self.levels.iter().enumerate() {
-            let settings = level_settings(plan, l, last, level.size);
+            let settings = level_settings(plan, l, last, level);
             queue.write_buffer(&level.settings, 0, bytemuck::bytes_of(&settings));
         }
+        queue.write_buffer(&self.steps, 0, bytemuck::bytes_of(&steps(plan, last)));
     }
 
     /// Where the mean of level `l` goes, from 1 on.
@@ -206,7 +273,30 @@ impl Scratch {
     }
 }
 
-fn level_settings(plan: &Weights, l: usize, levels: usize, size: [u32; 2]) -> Level {
+fn steps(plan: &Weights, last: usize) -> [Step; STEPS] {
+    let mut steps = [Step::default(); STEPS];
+    let mut next = steps.iter_mut();
+    for l in 0..=last {
+        let kinds = if l == 0 {
+            plan.kernels.fine
+        } else {
+            plan.kernels.coarse
+        };
+        let variances: Vec<f32> = kinds.blurs().map(|b| b.variance_px2 as f32).collect();
+        for (pair, j) in variances.chunks(2).zip((0..).step_by(2)) {
+            if let Some(step) = next.next() {
+                *step = Step {
+                    variances: [pair[0], pair.get(1).copied().unwrap_or(0.0)],
+                    level: l as u32,
+                    slot: plan.slot(l, j) as u32,
+                };
+            }
+        }
+    }
+    steps
+}
+
+fn level_settings(plan: &Weights, l: usize, last: usize, level: &LevelScratch) -> Level {
     let kinds = if l == 0 {
         plan.kernels.fine
     } else {
@@ -227,43 +317,48 @@ fn level_settings(plan: &Weights, l: usize, levels: usize, size: [u32; 2]) -> Le
     }
     Level {
         blurs,
-        size: Vec2::new(size[0] as f32, size[1] as f32),
+        size: Vec2::new(level.size[0] as f32, level.size[1] as f32),
         scale: (1 << l) as f32,
         rest: plan.rest_slot(l) as u32,
-        coarser: u32::from(l < levels),
-        pad: [0; 3],
+        coarser: u32::from(l < last),
+        first_tile: level.first_tile,
+        tile_count: level.tiles[0] * level.tiles[1],
+        pad: 0,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pyramid::passes::{BLURS, PACK, TILES};
+    use crate::pyramid::passes::{DIRECT, LIST_TILES, PLANAR};
     use crate::wgsl::assert_layout;
 
     #[test]
     fn constants_are_those_of_the_shaders() {
-        let rows = crate::plan::ROWS_PER_OCTAVE;
-        let [blurs, tiles, pack] = [BLURS[0], TILES, PACK].map(<[&str]>::concat);
-        for shader in [&blurs, &tiles] {
-            assert!(shader.contains(&format!("const TILE = {TILE}u;")));
-            assert!(shader.contains(&format!("const ROWS_PER_OCTAVE = {rows:.1};")));
-        }
-        // A bit for the frame and for each level, then for the bends; from the other end for each profile.
-        let bends = format!("const BENT_SHIFT = {}u;", crate::plan::MAX_LEVELS + 1);
-        for shared in ["const FLAT_LEVELS = 3u;", &bends] {
-            assert!(tiles.contains(shared) && pack.contains(shared));
-        }
+        let shader = DIRECT.concat();
+        let levels = crate::plan::MAX_LEVELS + 1;
         let profiles = 32 - crate::MAX_PROFILES;
-        assert!(tiles.contains(&format!("const PROFILE_SHIFT = {profiles}u;")));
-        assert!(tiles.contains(&format!("const COLUMNS = {COLUMNS}u;")));
+        for constant in [
+            format!("const TILE = {TILE}u;"),
+            format!("const CLASSES = {CLASSES}u;"),
+            format!("const STEPS = {STEPS}u;"),
+            format!("const GRIDS = {levels}u;"),
+            format!("const LEVELS = {:#x}u;", (1 << levels) - 1),
+            format!("const DIFFICULTY_SHIFT = {levels}u;"),
+            format!("const PROFILE_SHIFT = {profiles}u;"),
+            format!(
+                "const ROWS_PER_OCTAVE = {:.1};",
+                crate::plan::ROWS_PER_OCTAVE
+            ),
+        ] {
+            assert!(shader.contains(&constant), "{constant}");
+        }
     }
 
     #[test]
     fn structs_lie_as_the_shaders_have_them() {
-        let [blurs, tiles] = [BLURS[0], TILES].map(<[&str]>::concat);
         assert_layout!(
-            &blurs,
+            &PLANAR.concat(),
             "View",
             View {
                 has_id,
@@ -278,11 +373,15 @@ mod tests {
                 stride,
                 profiles,
                 first_pixel,
-                size
+                size,
+                planar_limit,
+                general_limit,
+                levels,
+                first_direct
             }
         );
         assert_layout!(
-            &blurs,
+            &PLANAR.concat(),
             "Blur",
             Blur {
                 variance,
@@ -294,28 +393,28 @@ mod tests {
             }
         );
         assert_layout!(
-            &blurs,
+            &PLANAR.concat(),
             "Level",
             Level {
                 blurs,
                 size,
                 scale,
                 rest,
-                coarser
+                coarser,
+                first_tile,
+                tile_count
             }
-        );
-        assert_eq!(
-            crate::wgsl::layout(&tiles, "View"),
-            crate::wgsl::layout(&blurs, "View")
         );
         assert_layout!(
-            &tiles,
-            "Level",
-            Gathering {
-                tiles,
-                below,
-                level
+            &DIRECT.concat(),
+            "Step",
+            Step {
+                variances,
+                level,
+                slot
             }
         );
+        let (_, draw) = crate::wgsl::layout(&LIST_TILES.concat(), "Draw");
+        assert_eq!(draw as u64, DRAW_BYTES);
     }
 }

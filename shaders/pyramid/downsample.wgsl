@@ -8,32 +8,44 @@
 @group(0) @binding(12) var linear: sampler;
 
 @fragment
-fn fs_halve(@builtin(position) at: vec4f) -> Surface {
+fn fs_downsample(@builtin(position) at: vec4f) -> Surface {
     let pixel = vec2i(at.xy);
-    if CAREFUL {
-        return halved(pixel);
+    if CLASS == GENERAL {
+        return of_one_surface(pixel);
     }
+    return of_all(pixel);
+}
+
+// All of the pixels are of one surface.
+fn of_all(pixel: vec2i) -> Surface {
     // Between two pixels, three quarters on the way to the inner one.
     let texel = 1.0 / vec2f(textureDimensions(finer_light));
-    let inner = (2.0 * vec2f(pixel) + 1.0 - 0.75) * texel;
-    let outer = (2.0 * vec2f(pixel) + 1.0 + 0.75) * texel;
-    var light = vec4f(0.0);
-    for (var i = 0u; i < 4u; i++) {
-        let uv = select(inner, outer, vec2<bool>((i & 1u) == 1u, i > 1u));
-        let there = textureSampleLevel(finer_light, linear, uv, 0.0);
-        light += 0.25 * there.a * vec4f(there.rgb, 1.0);
+    let middle = (2.0 * vec2f(pixel) + 1.0) * texel;
+    let off = 0.75 * texel;
+    let light = textureSampleLevel(finer_light, linear, middle - off, 0.0)
+        + textureSampleLevel(finer_light, linear, middle + vec2f(off.x, -off.y), 0.0)
+        + textureSampleLevel(finer_light, linear, middle + vec2f(-off.x, off.y), 0.0)
+        + textureSampleLevel(finer_light, linear, middle + off, 0.0);
+    var z = 0.0;
+    var sines = vec2f(0.0);
+    var count = 0.0;
+    var id = 0u;
+    for (var i = 0; i < 4; i++) {
+        let there = textureLoad(finer_shape, 2 * pixel + vec2i(i & 1, i >> 1u), 0).rg;
+        let is_skin = f32(there.x >> 24u != 0u);
+        z += is_skin * bitcast<f32>(there.y);
+        sines += is_skin * sines_of(there);
+        count += is_skin;
+        id = max(id, there.x >> 24u);
     }
-    let a = textureLoad(finer_shape, 2 * pixel, 0).rg;
-    let b = textureLoad(finer_shape, 2 * pixel + 1, 0).rg;
-    let z = 0.5 * (bitcast<f32>(a.y) + bitcast<f32>(b.y));
-    return Surface(
-        half_floats(vec4f(light.rgb / max(light.a, LEAST_AREA), light.a)),
-        packed(a.x >> 24u, z, 0.5 * (sines_of(a) + sines_of(b))),
-    );
+    if count == 0.0 {
+        return Surface(vec4f(0.0), vec2u(0u));
+    }
+    return Surface(half_floats(0.25 * light), packed(id, z / count, sines / count));
 }
 
 // The surface is that of the nearest of the four pixels that this one covers.
-fn halved(pixel: vec2i) -> Surface {
+fn of_one_surface(pixel: vec2i) -> Surface {
     let none = Surface(vec4f(0.0), vec2u(0u));
     let last = vec2i(textureDimensions(finer_shape)) - 1;
     var reference = vec2u(0u);
@@ -71,10 +83,10 @@ fn halved(pixel: vec2i) -> Surface {
             let share = (3.0 - 2.0 * is_outer.x) * (3.0 - 2.0 * is_outer.y) / 64.0;
             let off = (z_there - nearest) / tolerance;
             let is_same = there.x >> 24u == surface.id && all(q >= vec2i(0)) && all(q <= last);
-            let w = select(0.0, share * e.a * saturate(2.0 - 2.0 * abs(off)), is_same);
-            light += w * vec4f(e.rgb, 1.0);
-            z += w * z_there;
-            sines += w * sines_of(there);
+            let w = select(0.0, share * saturate(2.0 - 2.0 * abs(off)), is_same);
+            light += w * e;
+            z += w * e.a * z_there;
+            sines += w * e.a * sines_of(there);
         }
     }
     let area = light.a;
@@ -82,7 +94,7 @@ fn halved(pixel: vec2i) -> Surface {
         return none;
     }
     return Surface(
-        half_floats(vec4f(light.rgb / area, max(area, LEAST_AREA))),
+        half_floats(light),
         packed(surface.id, z / area, sines / area),
     );
 }

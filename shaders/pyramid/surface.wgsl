@@ -24,6 +24,13 @@ struct View {
     // Of the viewport, in the textures of the host.
     first_pixel: vec2u,
     size: vec2u,
+    // How far planar blurs may be off in a tile by their looks, for it to be planar, and to be general.
+    planar_limit: f32,
+    general_limit: f32,
+    // Levels above the frame.
+    levels: u32,
+    // Where tiles that are summed directly are in lists.
+    first_direct: u32,
 }
 
 // A Gaussian, cut off by a shape of taps.
@@ -52,16 +59,34 @@ struct Level {
     rest: u32,
     // 1 where there is a coarser level.
     coarser: u32,
+    // Where its tiles are in lists, and how many.
+    first_tile: u32,
+    tile_count: u32,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> level: Level;
-// x in the low half: those that are simple from the front on, the others from the end.
+// Of all levels; x in the low half. Of a level the planar ones from the front on, the general ones from the
+// end; those of the frame that are summed directly after all levels.
 @group(0) @binding(2) var<storage, read> tiles: array<u32>;
 
-// Whether a tile may hold whatever there is; else it is skin of one profile throughout, nearly flat and
-// turned evenly, and so are the pixels around it.
-override CAREFUL: bool = true;
+// Which tiles a pass is over.
+override CLASS: u32 = 0u;
+const PLANAR = 0u;
+const GENERAL = 1u;
+const DIRECT = 2u;
+const CLASSES = 3u;
+
+// What a tile holds, a bit each, so that several together hold all of theirs: each level that light is needed
+// of; how difficult the surface is; whether there is anything but skin; each profile.
+const LEVELS = 0x7ffu;
+const DIFFICULTY_SHIFT = 11u;
+const NOT_SKIN = 1u << 15u;
+const PROFILE_SHIFT = 16u;
+const PROFILES = 0xffffu << PROFILE_SHIFT;
+// The frame and its levels.
+const GRIDS = 11u;
+const ROWS_PER_OCTAVE = 6.0;
 
 const TILE = 8u;
 // How far from the plane a pixel may lie to be of the same surface, in mm a pixel of the level.
@@ -70,7 +95,13 @@ const TOLERANCE = 2.0;
 const LEAST_AREA = 1e-3;
 
 fn tile_of(instance: u32) -> vec2u {
-    let tile = tiles[select(instance, arrayLength(&tiles) - 1u - instance, CAREFUL)];
+    var place = level.first_tile + instance;
+    if CLASS == GENERAL {
+        place = level.first_tile + level.tile_count - 1u - instance;
+    } else if CLASS == DIRECT {
+        place = view.first_direct + instance;
+    }
+    let tile = tiles[place];
     return vec2u(tile & 0xffffu, tile >> 16u);
 }
 
@@ -94,8 +125,8 @@ fn vs_tile(
 
 // The two textures that hold a surface.
 struct Surface {
-    // Light, and area over that of a surface that faces the camera; less where part of the pixel is
-    // not of it.
+    // Area over that of a surface that faces the camera, less where part of the pixel is not of it; and
+    // light times that.
     @location(0) light: vec4f,
     @location(1) shape: vec2u,
 }

@@ -42,7 +42,7 @@ fn neighbour(i: i32, j: i32) -> Neighbour {
     let there = textureLoad(here_shape, q, 0).rg;
     var e = textureLoad(here_light, q, 0);
     let outside = any(q < vec2i(0)) || any(q > center.last);
-    e.a = select(e.a, 0.0, outside || there.x >> 24u != center.id);
+    e = select(e, vec4f(0.0), outside || there.x >> 24u != center.id);
     // Off the plane along the ray.
     let on_ray = f32(i) * center.to_ray_u + f32(j) * center.to_ray_v;
     let off = bitcast<f32>(there.y) - center.plane.z - on_ray.y;
@@ -50,9 +50,8 @@ fn neighbour(i: i32, j: i32) -> Neighbour {
 }
 
 fn add(there: Neighbour, weight: vec3f) {
-    let k = there.e.a * weight;
-    light += k * there.e.rgb;
-    mass += k;
+    light += weight * there.e.rgb;
+    mass += weight * there.e.a;
 }
 
 // What is off the plane, as it adds to exponents. What the pyramid blurs by itself knows no distance off
@@ -69,7 +68,7 @@ fn off_plane(bend: f32) -> vec4f {
 fn tap(i: i32, j: i32, exponents: vec4f) {
     let there = neighbour(i, j);
     // No weight grows beyond the middle's.
-    let weights = exp(min(-exponents - off_plane(there.bend), vec4f(0.0)));
+    let weights = weights_of(min(-exponents - off_plane(there.bend), vec4f(0.0)));
     add(there, center.blurs.colors * weights);
 }
 
@@ -193,7 +192,8 @@ fn fs_level(@builtin(position) at: vec4f) -> @location(0) vec4f {
     if shape.id == 0u {
         return vec4f(0.0);
     }
-    return mean_of(gathered(pixel, textureLoad(here_light, pixel, 0).rgb, shape));
+    let e = light_of(textureLoad(here_light, pixel, 0));
+    return mean_of(gathered(pixel, e, shape));
 }
 
 @fragment
@@ -204,6 +204,6 @@ fn fs_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
     if shape.id == 0u || share <= 0.0 {
         discard;
     }
-    let e = textureLoad(here_light, pixel, 0).rgb;
+    let e = light_of(textureLoad(here_light, pixel, 0));
     return scattered(pixel, gathered(pixel, e, shape), e, share);
 }

@@ -1,18 +1,24 @@
-// The frame as the pyramid has it: light and area, and where the surface is. Follows surface.wgsl.
+// The frame as the pyramid has it: light and area, and where the surface is; and what its tiles hold, which
+// says how they can be blurred. A workgroup is a tile. Follows surface.wgsl.
 
+@group(0) @binding(3) var<storage, read> weights: array<vec4f>;
 @group(0) @binding(4) var irradiance: texture_2d<f32>;
 @group(0) @binding(5) var depth: texture_2d<f32>;
 @group(0) @binding(6) var profile_id: texture_2d<u32>;
-// Of each tile, as in tiles.wgsl: a bit for each level at which it is not flat, from BENT_SHIFT on.
-@group(0) @binding(11) var<storage, read_write> marked: array<atomic<u32>>;
+@group(0) @binding(7) var packed_light: texture_storage_2d<rgba16float, write>;
+@group(0) @binding(8) var packed_shape: texture_storage_2d<rg32uint, write>;
+// As in list_tiles.wgsl: of each level columns and rows of tiles, and where they begin.
+@group(0) @binding(9) var<uniform> grids: array<vec4u, GRIDS>;
+@group(0) @binding(10) var<storage, read_write> contents: array<atomic<u32>>;
 
-// Second differences of depth, over the mm of a pixel, up to which a level is flat.
-const FLAT = 0.4;
-// Levels that may have flat tiles; as in tiles.wgsl.
-const FLAT_LEVELS = 3u;
-const BENT_SHIFT = 11u;
 // ∂z over the mm of a pixel that a surface may have.
 const STEEPEST = 40.0;
+
+// What the tile holds, gathered over its pixels.
+var<workgroup> marks: atomic<u32>;
+// Bits of a float, which as integers are in its order; of the darkest what all bits differ in.
+var<workgroup> brightest: atomic<u32>;
+var<workgroup> darkest: atomic<u32>;
 
 // Whether light is a number. By its bits, since compilers may take for granted that it is.
 fn is_finite(light: vec3f) -> bool {
@@ -65,25 +71,37 @@ fn tangent(pixel: vec2i, step: vec2i, sides: vec2f, mm: f32) -> f32 {
     return select(0.0, clamp(dz / mm, -STEEPEST, STEEPEST), abs(known) < STEEPEST * mm);
 }
 
-@fragment
-fn fs_pack(@builtin(position) at: vec4f) -> Surface {
-    let pixel = vec2i(at.xy);
-    let none = Surface(vec4f(0.0), vec2u(0u));
+// The coarsest level that a pixel at z of a profile is blurred at.
+fn coarsest_level(z: f32, id: u32) -> u32 {
+    let mm = abs(view.step.xy * z + view.step.zw);
+    // A slope is blurred at finer levels than a surface that faces the camera; what is narrower
+    // across a ray, or in a pixel that is not square, by less than two rows at coarser ones.
+    let row = ceil((-log2(max(mm.x, mm.y)) - view.first_octave) * ROWS_PER_OCTAVE) + 2.0;
+    let i = u32(clamp(row, 0.0, f32(view.rows - 1u)));
+    return u32(weights[((id - 1u) * view.rows + i) * view.stride].w);
+}
+
+// How difficult the surface at a pixel is, a bit each for .03, .125, .5 and 2: second differences of depth
+// over the mm of a pixel, of which a level has twice as many as the one before.
+fn difficulty_bits(bend: f32) -> u32 {
+    let passed = vec4<bool>(vec4f(bend) > vec4f(0.03125, 0.125, 0.5, 2.0));
+    return dot(vec4u(passed), vec4u(1u, 2u, 4u, 8u)) << DIFFICULTY_SHIFT;
+}
+
+// Packs a pixel of the viewport, and adds what it holds to what its tile does.
+fn pack(pixel: vec2i) {
     let pixel_of_host = vec2i(view.first_pixel) + pixel;
     var id = 1u;
     if view.has_id != 0u {
         id = textureLoad(profile_id, pixel_of_host, 0).r;
     }
-    if id == 0u || id > view.profiles {
-        return none;
-    }
-    let size = vec2i(view.size);
-    let last = size - 1;
     let z = z_at(pixel);
     // Infinitely far away there is no surface.
-    if !(abs(z) < 3e38) || depth_at(pixel) == view.far {
-        return none;
+    if id == 0u || id > view.profiles || !(abs(z) < 3e38) || depth_at(pixel) == view.far {
+        atomicOr(&marks, NOT_SKIN);
+        return;
     }
+    let last = vec2i(view.size) - 1;
     let left = z_at(vec2i(max(pixel.x - 1, 0), pixel.y));
     let right = z_at(vec2i(min(pixel.x + 1, last.x), pixel.y));
     let above = z_at(vec2i(pixel.x, max(pixel.y - 1, 0)));
@@ -94,18 +112,7 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     let east = select(right - z, z - left, pixel.x == last.x);
     let north = select(z - above, below - z, pixel.y == 0);
     let south = select(below - z, z - above, pixel.y == last.y);
-    // Twice as much at each level; half of it is what a pixel is off the plane of its neighbour.
     let bend = max(abs(east - west) / mm.x, abs(south - north) / mm.y);
-    let light = textureLoad(irradiance, pixel_of_host, 0).rgb;
-    let is_light = is_finite(light);
-    if bend > FLAT / f32(1u << (FLAT_LEVELS - 1u)) || !is_light {
-        // 0 where all levels are bent, FLAT_LEVELS − 1 where the last is. Simple tiles have light.
-        let flat_levels = select(0u, u32(max(ceil(log2(FLAT / bend)), 0.0)), is_light);
-        let columns = (u32(size.x) + TILE - 1u) / TILE;
-        let tile = vec2u(pixel) / TILE;
-        let bends = (1u << FLAT_LEVELS) - (1u << flat_levels);
-        atomicOr(&marked[tile.y * columns + tile.x], bends << BENT_SHIFT);
-    }
     var shape = Shape(id, z, vec2f(0.0));
     shape.tangent.x = tangent(pixel, vec2i(1, 0), vec2f(west, east), mm.x);
     shape.tangent.y = tangent(pixel, vec2i(0, 1), vec2f(north, south), mm.y);
@@ -113,6 +120,35 @@ fn fs_pack(@builtin(position) at: vec4f) -> Surface {
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
     let sines = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);
     // Light that is no number goes no further. What is packed is half floats, which end there.
-    let packed_light = select(vec4f(0.0), vec4f(clamp(light, vec3f(-65504.0), vec3f(65504.0)), area), is_light);
-    return Surface(half_floats(packed_light), packed(id, z, sines));
+    let host = textureLoad(irradiance, pixel_of_host, 0).rgb;
+    let light = select(vec4f(0.0), vec4f(host * area, area), is_finite(host));
+    textureStore(packed_light, pixel, half_floats(clamp(light, vec4f(-65504.0), vec4f(65504.0))));
+    textureStore(packed_shape, pixel, vec4u(packed(id, z, sines), 0u, 0u));
+    atomicOr(&marks, (1u << coarsest_level(z, id)) | difficulty_bits(bend) | (1u << (PROFILE_SHIFT + id - 1u)));
+    let brightness = bitcast<u32>(max(max(host.r, host.g), max(host.b, 0.0)));
+    atomicMax(&brightest, brightness);
+    atomicMax(&darkest, ~brightness);
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn pack_tile(
+    @builtin(global_invocation_id) at: vec3u,
+    @builtin(workgroup_id) tile: vec3u,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    if all(at.xy < view.size) {
+        pack(vec2i(at.xy));
+    } else {
+        atomicOr(&marks, NOT_SKIN);
+    }
+    workgroupBarrier();
+    // To the tile of each level that this one is a part of.
+    if thread <= view.levels {
+        let grid = grids[thread];
+        let place = tile.xy >> vec2u(thread);
+        let first = 3u * (grid.z + place.y * grid.x + place.x);
+        atomicOr(&contents[first], atomicLoad(&marks));
+        atomicMax(&contents[first + 1u], atomicLoad(&brightest));
+        atomicMax(&contents[first + 2u], atomicLoad(&darkest));
+    }
 }

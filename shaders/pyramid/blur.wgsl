@@ -30,7 +30,6 @@ override DIFFERENCE: bool = false;
 // Whether this is the frame itself, which nothing blurred before.
 override FINEST: bool = false;
 
-const ROWS_PER_OCTAVE = 6.0;
 // How much narrower than a level's own a blur may get in the direction of a slope.
 const NARROWEST = 1.3;
 
@@ -165,7 +164,22 @@ fn exponents_at(blurs: Blurs, i: i32, j: i32) -> vec4f {
 }
 
 fn weights_at(blurs: Blurs, i: i32, j: i32) -> vec4f {
-    return exp(-exponents_at(blurs, i, j));
+    return weights_of(-exponents_at(blurs, i, j));
+}
+
+// Of those that there are.
+fn weights_of(exponents: vec4f) -> vec4f {
+    var weights = vec4f(exp(exponents.x), 0.0, 0.0, 0.0);
+    if BLURS > 1u {
+        weights.y = exp(exponents.y);
+    }
+    if BLURS > 2u {
+        weights.z = exp(exponents.z);
+    }
+    if SQUARE {
+        weights.w = exp(exponents.w);
+    }
+    return weights;
 }
 
 // Of the square alone, whose taps the others do not have.
@@ -200,6 +214,11 @@ struct Gathered {
 // to nothing what is left of it is a rounding error, of either sign: about 1e-7 on this side of 1, and more
 // where a GPU interpolates in fixed point. Nothing may be divided by it.
 const NEGLIGIBLE_WEIGHT = 1e-4;
+
+// The light of a pixel that holds so much for its area.
+fn light_of(here: vec4f) -> vec3f {
+    return here.rgb / max(here.a, 1e-6);
+}
 
 // The part that blurs have of the light, from what their taps found and what these weigh; of a weight that
 // is negligible the pixel's own light takes the place.

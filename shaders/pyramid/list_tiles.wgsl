@@ -1,0 +1,98 @@
+// Which tiles each level is made of, and which of them are planar: what lets all other passes run there
+// alone, and as cheaply as they can. Follows surface.wgsl.
+
+// Of each level columns and rows of tiles, and where they begin.
+@group(0) @binding(9) var<uniform> grids: array<vec4u, GRIDS>;
+// Three words of each tile, as pack.wgsl has them.
+@group(0) @binding(10) var<storage, read> contents: array<u32>;
+@group(0) @binding(11) var<storage, read_write> draws: array<Draw>;
+@group(0) @binding(12) var<storage, read_write> list: array<u32>;
+
+struct Draw {
+    vertices: u32,
+    instances: atomic<u32>,
+    first_vertex: u32,
+    first_instance: u32,
+}
+
+struct Contents {
+    marks: u32,
+    brightest: u32,
+    darkest: u32,
+}
+
+// Of a tile; beyond the level there is no skin.
+fn contents_of(grid: vec4u, tile: vec2i) -> Contents {
+    if any(tile < vec2i(0)) || any(tile >= vec2i(grid.xy)) {
+        return Contents(NOT_SKIN, 0u, 0u);
+    }
+    let first = 3u * (grid.z + u32(tile.y) * grid.x + u32(tile.x));
+    return Contents(contents[first], contents[first + 1u], contents[first + 2u]);
+}
+
+// What a tile and those around it hold together.
+fn contents_around(grid: vec4u, tile: vec2i) -> Contents {
+    var held = Contents();
+    for (var i = 0; i < 9; i++) {
+        let one = contents_of(grid, tile + vec2i(i % 3, i / 3) - 1);
+        held.marks |= one.marks;
+        held.brightest = max(held.brightest, one.brightest);
+        held.darkest = max(held.darkest, one.darkest);
+    }
+    return held;
+}
+
+// What pixels without skin are taken for.
+const HOLES = 1.0;
+
+// Whether pixels are so far from square that blurs of few taps do not fit them, and not so far that steps of
+// two pixels do.
+fn has_odd_pixels() -> bool {
+    // Of a perspective camera the latter are 0, of an orthographic one the former.
+    let px = abs(view.step.xy) + abs(view.step.zw);
+    let ratio = max(px.x, px.y) / min(px.x, px.y);
+    return ratio > 1.1 && ratio < 1.7;
+}
+
+// How far blurs that take the surface for planar may be off, in tiles that hold so much together: how bent
+// the surface is, up to 2, times the range of light.
+fn doubt(held: Contents, l: u32) -> f32 {
+    let difficulty = (held.marks >> DIFFICULTY_SHIFT) & 15u;
+    // The largest bound that the surface passed: .03, .125, .5 or 2, and twice that on each level.
+    var bend = select(0.0, exp2(f32(2u * firstLeadingBit(difficulty) + l) - 5.0), difficulty != 0u);
+    bend = max(bend, select(0.0, HOLES, (held.marks & NOT_SKIN) != 0u));
+    bend = max(bend, select(0.0, 2.0, has_odd_pixels()));
+    return min(bend, 2.0) * (bitcast<f32>(held.brightest) - bitcast<f32>(~held.darkest));
+}
+
+// One thread a tile: lists those with skin that need their level, or are next to one that does.
+@compute @workgroup_size(8, 8)
+fn list_tiles(@builtin(global_invocation_id) at: vec3u) {
+    let l = at.z;
+    let grid = grids[l];
+    let tile = vec2i(at.xy);
+    if any(at.xy >= grid.xy) {
+        return;
+    }
+    let middle = contents_of(grid, tile);
+    if (middle.marks & PROFILES) == 0u {
+        return;
+    }
+    let around = contents_around(grid, tile);
+    if (around.marks & LEVELS) >> l == 0u {
+        return;
+    }
+    let word = (at.y << 16u) | at.x;
+    var near = middle;
+    if has_odd_pixels() {
+        near = around;
+    }
+    if l == 0u && doubt(near, l) > view.general_limit {
+        list[view.first_direct + atomicAdd(&draws[DIRECT].instances, 1u)] = word;
+    } else if countOneBits(around.marks & PROFILES) > 1u || doubt(around, l) > view.planar_limit {
+        let end = grid.z + grid.x * grid.y - 1u;
+        list[end - atomicAdd(&draws[CLASSES * l + GENERAL].instances, 1u)] = word;
+    } else {
+        list[grid.z + atomicAdd(&draws[CLASSES * l + PLANAR].instances, 1u)] = word;
+    }
+}
