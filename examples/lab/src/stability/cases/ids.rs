@@ -165,7 +165,7 @@ fn same_profile() -> Case {
         let pixels: Vec<usize> = (0..96 * 96).collect();
         Ok(apart(&both[0], &both[1], &pixels).into())
     };
-    let what = "Flat skin under a soft edge of light, 4 px/mm, of one id; and with another id of \
+    let what = "Flat skin under a hard edge of light, 4 px/mm, of one id; and with another id of \
         the same profile beyond a line that crosses it: largest difference of a method to \
         itself. Rivals take one profile.";
     let why = "Light does not cross from one id to another, whatever their profiles. Give skin \
