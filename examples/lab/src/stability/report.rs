@@ -7,7 +7,7 @@ use image::codecs::jpeg::JpegEncoder;
 
 use crate::Error;
 use crate::output;
-use crate::stability::case::{GROUPS, INPUT, Judged, METHODS, Verdict, short};
+use crate::stability::case::{Bound, Case, GROUPS, INPUT, Judged, Known, METHODS, Verdict, short};
 use crate::stability::strip::strip;
 use crate::svg::Rasteriser;
 
@@ -116,41 +116,44 @@ fn table(rows: &[&Judged]) -> String {
     text + "\n"
 }
 
-/// Why thresholds are where they are, and why ours does not pass: each reason once, with its cases.
+/// Why thresholds are where they are, and why ours does not pass: each reason once.
 fn reasons(rows: &[&Judged]) -> String {
-    let mut text = String::new();
-    let mut said: Vec<(String, &str, Vec<&str>)> = Vec::new();
-    let mut say =
-        |of: String, why, name| match said.iter_mut().find(|(o, w, _)| *o == of && *w == why) {
-            Some((.., names)) => names.push(name),
-            None => said.push((of, why, vec![name])),
-        };
-    for Judged { case, .. } in rows {
-        let [passes, degrades] = [case.bound.passes, case.bound.degrades].map(short);
-        say(
-            format!("≤ {passes}, ≤ {degrades}"),
-            case.bound.why,
-            &case.name,
-        );
-    }
+    let mut bounds: Vec<Bound> = Vec::new();
+    // With the methods and the cases that each is of.
+    let mut reasons: Vec<(Known, Vec<String>, Vec<&str>)> = Vec::new();
     for judged in rows {
+        let Case { bound, name, .. } = &judged.case;
+        if !bounds.contains(bound) {
+            bounds.push(*bound);
+        }
         for known in judged.shortcomings() {
-            let nature = if known.by_nature { ", by nature" } else { "" };
-            say(
-                format!("`{}`{nature}", known.method),
-                known.why,
-                &judged.case.name,
-            );
+            let method = format!("`{}`", known.method);
+            match reasons.iter_mut().find(|(of, ..)| of.why == known.why) {
+                Some((_, methods, names)) => {
+                    methods.extend((!methods.contains(&method)).then_some(method));
+                    names.extend((!names.contains(&name.as_str())).then_some(name.as_str()));
+                }
+                None => reasons.push((*known, vec![method], vec![name])),
+            }
         }
     }
-    for (of, why, names) in said {
-        let of_all = names.len() == rows.len();
-        let names = if of_all {
-            "all".into()
-        } else {
-            names.join("; ")
-        };
-        text += &wrapped(&format!("- {of} ({names}): {why}"));
+    let mut text = String::new();
+    for Bound {
+        passes,
+        degrades,
+        why,
+    } in bounds
+    {
+        text += &wrapped(&format!(
+            "- ≤ {}, ≤ {}: {why}",
+            short(passes),
+            short(degrades)
+        ));
+    }
+    for (Known { by_nature, why, .. }, methods, names) in reasons {
+        let nature = if by_nature { ", by nature" } else { "" };
+        let (methods, names) = (methods.join(", "), names.join("; "));
+        text += &wrapped(&format!("- {methods}{nature} ({names}): {why}"));
     }
     text
 }

@@ -126,7 +126,7 @@ fn squares(quick: bool) -> Vec<Case> {
             whole(DVec2::X, DVec2::Y),
         )
         .known([by_nature(ATLAS, 0.1, coarse)]),
-        case("twenty texels a mm", narrow, &upright, strip),
+        case("twenty texels a mm", narrow, &upright, strip).pictured(false),
         rms("one island", whole(u, v)).pictured(false),
         rms("a hundred islands", hundred).known(seam(0.06)),
     ]
