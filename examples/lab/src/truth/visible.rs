@@ -70,11 +70,13 @@ impl Lattice {
             if b.length_squared() < a.length_squared() {
                 (a, b) = (b, a);
             }
-            let times = (a.dot(b) / a.length_squared()).round();
-            if times == 0.0 || !times.is_finite() {
+            let shorter = b - (a.dot(b) / a.length_squared()).round() * a;
+            // Also of no step at all, which makes it no number.
+            if shorter.length_squared() < b.length_squared() {
+                b = shorter;
+            } else {
                 break;
             }
-            b -= times * a;
         }
         let along = a.normalize_or_zero();
         let across = b - along * b.dot(along);
