@@ -15,9 +15,9 @@ const MAX_IMAGE_BYTES: u64 = 2 << 30;
 
 impl Reader<'_> {
     /// A material, and how its textures lie on the mesh. Its reason is empty where no name says what it is.
-    pub(super) fn material(
+    pub(super) fn material<'a>(
         &mut self,
-        from: &gltf::Material,
+        from: &gltf::Material<'a>,
         [mesh, node]: [&str; 2],
         alone: bool,
     ) -> Result<(Material, Mapping), Error> {
@@ -37,20 +37,14 @@ impl Reader<'_> {
                 pbr.roughness_factor(),
             ),
         };
-        let base = base.map(|t| {
-            let transform = t.extension_value("KHR_texture_transform");
-            (
-                Mapping::new(&t.texture(), t.tex_coord(), transform),
-                t.texture(),
-            )
-        });
-        let mut normal = from.normal_texture().map(|t| {
-            let transform = t.extension_value("KHR_texture_transform");
-            (
-                Mapping::new(&t.texture(), t.tex_coord(), transform),
-                t.texture(),
-            )
-        });
+        let lay = |texture: gltf::Texture<'a>, set: u32, transform: Option<&Value>| {
+            (Mapping::new(&texture, set, transform), texture)
+        };
+        let key = "KHR_texture_transform";
+        let base = base.map(|t| lay(t.texture(), t.tex_coord(), t.extension_value(key)));
+        let normal = from.normal_texture();
+        let normal_scale = normal.as_ref().map_or(1.0, |t| t.scale());
+        let mut normal = normal.map(|t| lay(t.texture(), t.tex_coord(), t.extension_value(key)));
         if let (Some(base), Some(map)) = (&base, &normal)
             && base.0 != map.0
         {
@@ -62,8 +56,8 @@ impl Reader<'_> {
         let mapping = base
             .as_ref()
             .or(normal.as_ref())
-            .map_or(Mapping::default(), |(mapping, _)| *mapping);
-        let normal_scale = from.normal_texture().map_or(1.0, |t| t.scale());
+            .map(|(mapping, _)| *mapping);
+        let mapping = mapping.unwrap_or_default();
         // JSON holds no infinity, but numbers that are too large for a float.
         if !normal_scale.is_finite() {
             let input = format!("{name}, normalTexture scale");
@@ -103,11 +97,12 @@ impl Reader<'_> {
         let source = texture.source().map(|image| image.index());
         let source = source.or_else(|| usize::try_from(webp()?).ok());
         let Some((index, json)) = source.and_then(|i| Some((i, images.get(i)?))) else {
-            let others = texture
+            let others: Vec<_> = texture
                 .extensions()
                 .into_iter()
-                .flat_map(|all| all.keys().cloned());
-            let got = format!("no image, but [{}]", Vec::from_iter(others).join(", "));
+                .flat_map(|all| all.keys())
+                .collect();
+            let got = format!("no image, but {others:?}");
             let input = format!("{}, texture {}", self.input, texture.index());
             return Err(Error::new(input, got, "a JPEG, PNG or WebP image"));
         };
