@@ -168,8 +168,10 @@ impl fmt::Display for Error {
             }
             Self::MaxError { got, reachable } => write!(
                 f,
-                "max_error: got {got}, needs {reachable:.4} or more for these profiles; Plan::exact keeps less, \
-                 at many times the cost"
+                "max_error: got {got}, needs {:.4} or more for these profiles; Plan::exact keeps less, \
+                 at many times the cost",
+                // rounded up, so that what is named can be had
+                (f64::from(*reachable) * 1e4).ceil() / 1e4
             ),
             Self::AlbedoUnused => write!(
                 f,

@@ -161,7 +161,7 @@ pub(crate) struct Draw<'a> {
 }
 
 impl Draw<'_> {
-    pub fn pipeline(&self, device: &Device) -> RenderPipeline {
+    pub(crate) fn pipeline(&self, device: &Device) -> RenderPipeline {
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(self.label),
             bind_group_layouts: &[Some(self.layout)],
@@ -230,7 +230,7 @@ pub(crate) struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    pub fn new(encoder: &'a mut CommandEncoder, times: Option<(&'a QuerySet, u32)>) -> Self {
+    pub(crate) fn new(encoder: &'a mut CommandEncoder, times: Option<(&'a QuerySet, u32)>) -> Self {
         Self {
             encoder,
             times,
@@ -239,7 +239,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// The labels of all passes so far.
-    pub fn finish(self) -> Vec<String> {
+    pub(crate) fn finish(self) -> Vec<String> {
         self.labels
     }
 
@@ -252,7 +252,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// Begins a pass over targets that keep what they hold, or are cleared, which spares tilers the load.
-    pub fn draw(
+    pub(crate) fn draw(
         &mut self,
         label: &str,
         targets: &[&TextureView],
@@ -290,7 +290,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// Begins a pass of dispatches.
-    pub fn dispatch(&mut self, label: &str) -> wgpu::ComputePass<'_> {
+    pub(crate) fn dispatch(&mut self, label: &str) -> wgpu::ComputePass<'_> {
         let queries = self.queries(label);
         self.encoder
             .begin_compute_pass(&wgpu::ComputePassDescriptor {

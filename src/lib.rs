@@ -25,14 +25,17 @@
 //! it, and what does not fit is an [`Error`] that names it.
 //!
 //! Features of the device: none, and no more than WebGPU's default limits. Feature `json` of the crate:
-//! profiles and plans as JSON, and serde's traits for them.
+//! profiles and plans as JSON, and serde's traits for them. Feature `physics`: profiles from layers, pigments
+//! and scattering coefficients.
 
 mod error;
 mod exact;
 mod frame;
 mod gpu;
 mod optics;
-mod plan;
+#[cfg(feature = "physics")]
+pub mod physics;
+pub mod plan;
 mod profile;
 mod pyramid;
 mod screen_space;
@@ -43,7 +46,7 @@ mod wgsl;
 
 pub use error::Error;
 pub use frame::{Frame, Output, Viewport};
-pub use plan::{DEFAULT_MAX_ERROR, Plan, Row};
+pub use plan::{DEFAULT_MAX_ERROR, Plan};
 pub use profile::{Gaussian, Profile};
 pub use screen_space::{ScreenSpace, View};
 pub use texture_space::{Atlas, TextureSpace};

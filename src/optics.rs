@@ -20,7 +20,7 @@ pub(crate) struct Optics {
 impl Optics {
     /// With clip x = P₀₀·X + P₀₂·z + P₀₃ and clip w = P₃₂·z + P₃₃, all in units of the scene,
     /// X = (x′·w − P₀₂·z − P₀₃)/P₀₀ at the device coordinate x′, which is linear over the pixels.
-    pub fn new(frame: &Frame) -> Result<Self, Error> {
+    pub(crate) fn new(frame: &Frame) -> Result<Self, Error> {
         let projection = Mat4::from_cols_array_2d(&frame.projection);
         // In double precision, since the inverse of a projection with a near plane of a millimetre loses
         // half of a float's digits.
@@ -66,7 +66,7 @@ impl Optics {
     }
 
     /// Checks what the pyramid needs on top: depth that depends on z alone, in a right-handed view space.
-    pub fn check_depth_alone(frame: &Frame) -> Result<(), Error> {
+    pub(crate) fn check_depth_alone(frame: &Frame) -> Result<(), Error> {
         let projection = Mat4::from_cols_array_2d(&frame.projection);
         let [z, w] = [2, 3].map(|i| projection.row(i));
         let needs = if [z.x, z.y, w.x, w.y].iter().any(|c| *c != 0.0) {
@@ -83,14 +83,14 @@ impl Optics {
     }
 
     /// z = (x·depth + y)/(z·depth + w), in mm.
-    pub fn depth_to_mm(&self) -> Vec4 {
+    pub(crate) fn depth_to_mm(&self) -> Vec4 {
         let m = self.inverse_projection;
         Vec4::new(m.z_axis.z, m.w_axis.z, m.z_axis.w, m.w_axis.w)
     }
 
     /// The mm between pixels of a surface that faces the camera, at z mm in view space: along a row
     /// |x + y·z|, along a column |z + w·z|; signed as the axes of the picture are.
-    pub fn spacing(&self) -> Vec4 {
+    pub(crate) fn spacing(&self) -> Vec4 {
         let s = self.step;
         Vec4::new(s.z, s.x, s.w, s.y)
     }

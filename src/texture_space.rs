@@ -2,7 +2,7 @@
 
 use wgpu::{CommandEncoder, Device, QuerySet, Queue, TextureFormat, TextureView};
 
-use crate::exact::gaussian_sum::{GaussianSum, Settings, Sums, Textures};
+use crate::exact::gaussian_sum::{GaussianSum, Inputs, Settings, Sums, Textures};
 use crate::gpu::Recorder;
 use crate::validate::{self, Role};
 use crate::{Error, Output, Profile};
@@ -85,7 +85,7 @@ impl TextureSpace {
             self.sums = None; // The old scratch goes before the new one comes.
         }
         let sums = self.sums.get_or_insert_with(|| self.sum.sums(device, size));
-        let read = Textures {
+        let textures = Textures {
             positions: atlas.positions.clone(),
             irradiance: atlas.irradiance.clone(),
             strength: atlas.irradiance.clone(),
@@ -95,9 +95,8 @@ impl TextureSpace {
             gutter: GUTTER,
             ..Settings::new(&self.profiles, atlas.mm_per_unit)
         };
-        let profiles = &self.profiles;
-        self.sum
-            .prepare(device, queue, sums, read, &settings, profiles, None);
+        let inputs = Inputs::new(&self.profiles, textures, settings, None);
+        self.sum.prepare(device, queue, sums, inputs);
         Ok(())
     }
 

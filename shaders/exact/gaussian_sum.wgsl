@@ -50,7 +50,7 @@ struct Settings {
 // Of a profile.
 const MAX_GAUSSIANS = 8u;
 // Beyond 3.5 σ a Gaussian on a plane holds e^(−3.5²/2) = .2 % of its mass.
-const REACH_SIGMAS = 3.5;
+const REACH_SIGMAS: f32 = 3.5;
 // Up to this variance along each of three steps of the lattice, in steps², a kernel is summed over their
 // neighbours: there a row of taps is too coarse to be sheared.
 const SMALL = 0.4;
@@ -230,7 +230,7 @@ fn lattice_variance(variance_mm2: f32, spacing: f32) -> f32 {
     }
     let passed = exp(-0.5 * WAVE * WAVE * s);
     var w = 0.5 * (1.0 - passed) / (passed - COS_WAVE);
-    for (var step = 0; step < 6; step++) {
+    for (var step = 0; step < 11; step++) {
         let w4 = w * w * w * w;
         w = 0.5 * (1.0 - passed - 2.0 * (passed - COS_2WAVE) * w4) / (passed - COS_WAVE);
     }

@@ -47,7 +47,7 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
-    pub fn new(profiles: &[Profile], mm_per_unit: f32) -> Self {
+    pub(crate) fn new(profiles: &[Profile], mm_per_unit: f32) -> Self {
         let mut settings = Self {
             mm_per_unit,
             profiles: profiles.len() as u32,
@@ -107,7 +107,33 @@ struct Groups {
     viewport: Option<Viewport>,
 }
 
-/// The textures of one frame, already checked.
+/// One frame, already checked.
+pub(crate) struct Inputs {
+    pub(crate) textures: Textures,
+    pub(crate) settings: Settings,
+    /// The most that a profile has.
+    pub(crate) gaussians: u32,
+    pub(crate) viewport: Option<Viewport>,
+}
+
+impl Inputs {
+    pub(crate) fn new(
+        profiles: &[Profile],
+        textures: Textures,
+        settings: Settings,
+        viewport: Option<Viewport>,
+    ) -> Self {
+        let counts = profiles.iter().map(|p| p.gaussians().len() as u32);
+        Self {
+            textures,
+            settings,
+            gaussians: counts.max().unwrap_or(0),
+            viewport,
+        }
+    }
+}
+
+/// The textures of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Textures {
     pub positions: TextureView,
@@ -118,7 +144,7 @@ pub(crate) struct Textures {
 }
 
 impl GaussianSum {
-    pub fn new(device: &Device, output: Output, label: &'static str) -> Self {
+    pub(crate) fn new(device: &Device, output: Output, label: &'static str) -> Self {
         let module = gpu::module(device, label, &[SHADER]);
         let pass = |fragment: &str, textures: &[u32], target: ColorTargetState| {
             let label = format!("{label} {fragment}");
@@ -163,7 +189,7 @@ impl GaussianSum {
     }
 
     /// Scratch for a surface of this size.
-    pub fn sums(&self, device: &Device, size: [u32; 2]) -> Sums {
+    pub(crate) fn sums(&self, device: &Device, size: [u32; 2]) -> Sums {
         let label = self.label;
         let view =
             |name: &str| gpu::scratch_texture(device, &format!("{label} {name}"), size, SCRATCH);
@@ -178,36 +204,19 @@ impl GaussianSum {
     }
 
     /// Uploads the numbers of a frame, and binds its textures where they are others than before.
-    pub fn prepare(
-        &self,
-        device: &Device,
-        queue: &Queue,
-        sums: &mut Sums,
-        read: Textures,
-        settings: &Settings,
-        profiles: &[Profile],
-        viewport: Option<Viewport>,
-    ) {
-        queue.write_buffer(&sums.settings, 0, bytemuck::bytes_of(settings));
-        let gaussians = profiles.iter().map(|p| p.gaussians().len()).max();
-        let gaussians = gaussians.unwrap_or(0) as u32;
+    pub(crate) fn prepare(&self, device: &Device, queue: &Queue, sums: &mut Sums, inputs: Inputs) {
+        queue.write_buffer(&sums.settings, 0, bytemuck::bytes_of(&inputs.settings));
         match &mut sums.groups {
-            Some(groups) if groups.read == read => {
-                groups.gaussians = gaussians;
-                groups.viewport = viewport;
+            Some(groups) if groups.read == inputs.textures => {
+                groups.gaussians = inputs.gaussians;
+                groups.viewport = inputs.viewport;
             }
-            _ => sums.groups = Some(self.bind(device, sums, read, gaussians, viewport)),
+            _ => sums.groups = Some(self.bind(device, sums, inputs)),
         }
     }
 
-    fn bind(
-        &self,
-        device: &Device,
-        sums: &Sums,
-        read: Textures,
-        gaussians: u32,
-        viewport: Option<Viewport>,
-    ) -> Groups {
+    fn bind(&self, device: &Device, sums: &Sums, inputs: Inputs) -> Groups {
+        let read = inputs.textures;
         let group = |pass: &Pass, sum: usize| {
             let texture = |binding: &u32| {
                 let view = match *binding {
@@ -231,13 +240,13 @@ impl GaussianSum {
             sums: [group(&self.sum, 0), group(&self.sum, 1)],
             resolve: [group(&self.resolve, 0), group(&self.resolve, 1)],
             read,
-            gaussians,
-            viewport,
+            gaussians: inputs.gaussians,
+            viewport: inputs.viewport,
         }
     }
 
     /// Records the frame that was last prepared; nothing before the first.
-    pub fn render(&self, recorder: &mut Recorder, sums: &Sums, output: &TextureView) {
+    pub(crate) fn render(&self, recorder: &mut Recorder, sums: &Sums, output: &TextureView) {
         let Some(groups) = &sums.groups else { return };
         let mut draw = |name: &str, pass: &Pass, group, to, instance: u32| {
             let label = format!("{} {name}", self.label);
@@ -268,12 +277,12 @@ impl GaussianSum {
 }
 
 impl Sums {
-    pub fn size(&self) -> [u32; 2] {
+    pub(crate) fn size(&self) -> [u32; 2] {
         self.size
     }
 
     /// The textures of the frame that was last prepared.
-    pub fn read(&self) -> Option<&Textures> {
+    pub(crate) fn read(&self) -> Option<&Textures> {
         self.groups.as_ref().map(|groups| &groups.read)
     }
 }

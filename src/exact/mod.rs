@@ -13,7 +13,7 @@ use wgpu::{
 use crate::gpu::{self, Recorder};
 use crate::optics::Optics;
 use crate::{Frame, Output, Profile};
-use gaussian_sum::{GaussianSum, SCRATCH, Sums, Textures};
+use gaussian_sum::{GaussianSum, Inputs, SCRATCH, Sums, Textures};
 
 /// Bytes a pixel: positions, and what [`GaussianSum`] takes.
 pub(crate) const BYTES_PER_PIXEL: u64 = 80;
@@ -60,7 +60,7 @@ struct Bound {
 }
 
 impl Exact {
-    pub fn new(device: &Device, output: Output) -> Self {
+    pub(crate) fn new(device: &Device, output: Output) -> Self {
         let label = "subsurface::exact positions";
         let bindings = [(0, gpu::UNIFORM), (1, gpu::FLOATS), (2, gpu::UINTS)];
         let layout = gpu::layout(device, label, ShaderStages::FRAGMENT, &bindings);
@@ -84,7 +84,7 @@ impl Exact {
     }
 
     /// Uploads the numbers of a frame. Makes anew what a change of its size, or of its textures, asks for.
-    pub fn prepare(
+    pub(crate) fn prepare(
         &self,
         device: &Device,
         queue: &Queue,
@@ -129,7 +129,7 @@ impl Exact {
                 group: gpu::group(device, LABEL, &self.layout, &resources),
             });
         }
-        let read = Textures {
+        let textures = Textures {
             positions: view.positions.clone(),
             irradiance: frame.irradiance.clone(),
             strength: frame.strength.unwrap_or(frame.irradiance).clone(),
@@ -142,13 +142,12 @@ impl Exact {
             has_albedo: u32::from(frame.albedo.is_some()),
             ..gaussian_sum::Settings::new(profiles, 1.0)
         };
-        let (sums, viewport) = (&mut view.sums, frame.viewport);
-        self.sum
-            .prepare(device, queue, sums, read, &settings, profiles, viewport);
+        let inputs = Inputs::new(profiles, textures, settings, frame.viewport);
+        self.sum.prepare(device, queue, &mut view.sums, inputs);
     }
 
     /// Records the frame that was last prepared.
-    pub fn render(&self, recorder: &mut Recorder, view: &ExactView, output: &TextureView) {
+    pub(crate) fn render(&self, recorder: &mut Recorder, view: &ExactView, output: &TextureView) {
         let Some(bound) = &view.bound else { return };
         let label = "subsurface::exact positions";
         let mut pass = recorder.draw(label, &[&view.positions], false);

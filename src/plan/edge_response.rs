@@ -29,10 +29,13 @@ const SHIFTS: [f64; 10] = [0.0, 0.4, 1.0, 2.0, 3.0, 6.3, 13.0, 27.6, 54.0, 105.0
 const OBLIQUE: [[i32; 2]; 2] = [[1, 1], [2, 1]];
 const OBLIQUE_SHIFTS: [f64; 3] = [0.3, 2.9, 13.0];
 
-/// Edges, where they are looked at, and what each kernel makes of them there.
+/// The directions across which edges are looked at.
+const DIRECTIONS: [[i32; 2]; 3] = [[1, 0], OBLIQUE[0], OBLIQUE[1]];
+
+/// Edges, where they are looked at, and what each blur makes of them there.
 pub(super) struct Responses {
     samples: Vec<Sample>,
-    /// A row a sample, a column a kernel: the light that stays first.
+    /// Of the light that stays, then of each blur: its response at every sample.
     pub columns: Vec<Vec<f64>>,
 }
 
@@ -44,63 +47,50 @@ struct Sample {
 }
 
 impl Responses {
-    pub fn new(kernels: &Kernels, levels: usize) -> Self {
-        let mut edges = Vec::new();
+    pub(super) fn new(kernels: &Kernels, levels: usize) -> Self {
+        let mut responses = Self {
+            samples: Vec::new(),
+            columns: vec![Vec::new(); kernels.variances_px2(levels).len()],
+        };
         for soft in [true, false] {
-            let edge = |across: [i32; 2]| {
-                move |shift: f64| Edge {
+            let of_axis = SHIFTS.iter().map(|shift| ([1, 0], *shift));
+            let oblique = OBLIQUE
+                .iter()
+                .flat_map(|across| OBLIQUE_SHIFTS.map(|shift| (*across, shift)));
+            for (across, shift) in of_axis.chain(oblique) {
+                let edge = Edge {
                     across,
                     soft,
                     shift,
-                }
-            };
-            edges.extend(SHIFTS.map(edge([1, 0])));
-            for across in OBLIQUE {
-                edges.extend(OBLIQUE_SHIFTS.map(edge(across)));
+                };
+                edge.pass(kernels, levels, &edge.pixels(), &mut responses);
             }
-        }
-        let mut responses = Self {
-            samples: Vec::new(),
-            columns: Vec::new(),
-        };
-        for edge in &edges {
-            edge.pass(kernels, levels, &edge.pixels(), &mut responses);
         }
         responses
     }
 
-    /// What the profile makes of the edges at `px_per_mm`, for each colour.
+    /// What the profile makes of the edges at `px_per_mm`, for each colour: Σᵢ wᵢ times the response of the
+    /// Gaussian vᵢ to a step (Li & Shao 2015, Eq. 9).
     ///
     /// A hard edge is scattered by the weights of the visible integral, on the pixels' lattice.
-    pub fn wanted(&self, profile: &Profile, px_per_mm: f64) -> [Vec<f64>; 3] {
-        let gaussians: Vec<_> = profile
-            .gaussians()
-            .iter()
-            .map(|g| {
-                let px2 = f64::from(g.variance_mm2) * px_per_mm * px_per_mm;
-                let directions = [[1, 0], OBLIQUE[0], OBLIQUE[1]];
-                let steps = directions.map(|across| (across, lattice_steps(across, px2)));
-                (glam::DVec3::from(g.weight.map(f64::from)), px2, steps)
-            })
-            .collect();
-        let mut wanted = [const { Vec::new() }; 3];
-        for sample in &self.samples {
-            let mut sum = glam::DVec3::ZERO;
-            for (weight, px2, steps) in &gaussians {
-                let steps = steps.iter().find(|(across, _)| *across == sample.across);
-                let passed = match steps {
+    pub(super) fn wanted(&self, profile: &Profile, px_per_mm: f64) -> [Vec<f64>; 3] {
+        let mut wanted = [0; 3].map(|_| vec![0.0; self.samples.len()]);
+        for gaussian in profile.gaussians() {
+            let px2 = f64::from(gaussian.variance_mm2) * px_per_mm * px_per_mm;
+            let beyond = DIRECTIONS.map(|across| (across, beyond_on_lattice(across, px2)));
+            for (i, sample) in self.samples.iter().enumerate() {
+                let passed = match beyond.iter().find(|(across, _)| *across == sample.across) {
                     _ if sample.soft => step(sample.x, px2 + 1.0),
                     Some((across, Some(beyond))) => {
                         let n = (sample.x.abs() * length(*across) - 0.5).round() as usize;
                         let above = 1.0 - beyond.get(n).unwrap_or(&0.0);
                         if sample.x > 0.0 { above } else { 1.0 - above }
                     }
-                    _ => step(sample.x, *px2),
+                    _ => step(sample.x, px2),
                 };
-                sum += *weight * passed;
-            }
-            for (column, value) in wanted.iter_mut().zip(sum.to_array()) {
-                column.push(value);
+                for (column, weight) in wanted.iter_mut().zip(gaussian.weight) {
+                    column[i] += f64::from(weight) * passed;
+                }
             }
         }
         wanted
@@ -113,7 +103,8 @@ fn length([a, b]: [i32; 2]) -> f64 {
 
 /// ½(1 + erf(x/√2v)), a unit edge that a Gaussian has passed over.
 fn step(x: f64, variance: f64) -> f64 {
-    if variance == 0.0 {
+    // erfc(6) is less than the last digit of 1.
+    if x.abs() >= 6.0 * (2.0 * variance).sqrt() {
         return f64::from(x > 0.0);
     }
     0.5 * erfc(-x / (2.0 * variance).sqrt())
@@ -121,7 +112,7 @@ fn step(x: f64, variance: f64) -> f64 {
 
 /// The share of the light that point weights on the lattice put beyond n + ½ steps of k on one side, n
 /// from 0; of wide Gaussians none, since the lattice no longer matters.
-fn lattice_steps(across: [i32; 2], variance_px2: f64) -> Option<Vec<f64>> {
+fn beyond_on_lattice([a, b]: [i32; 2], variance_px2: f64) -> Option<Vec<f64>> {
     // Beyond, the sum over half the lattice is within 1e-4 of the integral.
     if variance_px2 > 100.0 {
         return None;
@@ -129,31 +120,27 @@ fn lattice_steps(across: [i32; 2], variance_px2: f64) -> Option<Vec<f64>> {
     let s = lattice_variance(variance_px2);
     let reach = (7.0 * s.sqrt()).ceil() as i32 + 1;
     let weight = |n: i32| (-f64::from(n * n) / (2.0 * s)).exp();
-    let mass: f64 = (-reach..=reach).map(weight).sum();
-    let of_row: Vec<(i32, f64)> = (-reach..=reach).map(|n| (n, weight(n) / mass)).collect();
-    let taps = product(&of_row, &of_row);
-    let projected = projected(&taps, across);
-    let last = projected.last()?.0 as usize;
-    let mut at = vec![0.0; last + 2];
-    for (k, w) in &projected {
-        if let Ok(k) = usize::try_from(*k) {
-            at[k] = *w;
+    let weights: Vec<f64> = (-reach..=reach).map(weight).collect();
+    let mass: f64 = weights.iter().sum();
+    // Over k = a·x + b·y, from its least on.
+    let middle = ((a + b) * reach) as usize;
+    let mut of_k = vec![0.0; 2 * middle + 1];
+    for (x, of_x) in weights.iter().enumerate() {
+        for (y, of_y) in weights.iter().enumerate() {
+            of_k[a as usize * x + b as usize * y] += of_x * of_y;
         }
     }
-    // Beyond n + ½: from n + 1 on.
     let mut beyond = 0.0;
-    let mut steps: Vec<f64> = (0..=last)
-        .rev()
-        .map(|n| {
-            beyond += at[n + 1];
-            beyond
-        })
-        .collect();
+    let from_last = of_k[middle + 1..].iter().rev().map(|w| {
+        beyond += w / (mass * mass);
+        beyond
+    });
+    let mut steps: Vec<f64> = from_last.collect();
     steps.reverse();
     Some(steps)
 }
 
-/// As `lattice_variance` in `shaders/exact/gaussian_sum.wgsl`, in px².
+/// As `lattice_variance` in `shaders/exact/gaussian_sum.wgsl`, which derives it; in px².
 fn lattice_variance(s: f64) -> f64 {
     const WAVE: f64 = 1.1;
     if !(1e-6..=0.4).contains(&s) {
@@ -162,7 +149,7 @@ fn lattice_variance(s: f64) -> f64 {
     let passed = (-0.5 * WAVE * WAVE * s).exp();
     let (near, far) = (WAVE.cos(), (2.0 * WAVE).cos());
     let mut w = 0.0;
-    for _ in 0..8 {
+    for _ in 0..12 {
         let w4 = f64::powi(w, 4);
         w = 0.5 * (1.0 - passed - 2.0 * (passed - far) * w4) / (passed - near);
     }
@@ -265,37 +252,42 @@ impl Edge {
             first: -half,
             values: (-half..half).map(edge).collect(),
         };
-        let first = to.columns.len();
-        for [x, y] in pixels {
-            let k = self.across[0] * x + self.across[1] * y;
-            to.samples.push(Sample {
-                across: self.across,
-                soft: self.soft,
-                x: self.distance(k),
-            });
-            let mut columns = vec![frame.at(k)];
-            for blur in kernels.fine.blurs() {
-                columns.push(frame.sum(k, &projected(&blur.taps(0), self.across)));
+        let [a, b] = self.across;
+        let ks: Vec<i32> = pixels.iter().map(|[x, y]| a * x + b * y).collect();
+        to.samples.extend(ks.iter().map(|k| Sample {
+            across: self.across,
+            soft: self.soft,
+            x: self.distance(*k),
+        }));
+        let mut columns = to.columns.iter_mut();
+        let mut add = |response: &mut dyn Iterator<Item = f64>| {
+            if let Some(column) = columns.next() {
+                column.extend(response);
             }
-            to.columns.push(columns);
+        };
+        add(&mut ks.iter().map(|k| frame.at(*k)));
+        for blur in kernels.fine.blurs() {
+            let taps = projected(&blur.taps(0), self.across);
+            add(&mut ks.iter().map(|k| frame.sum(*k, &taps)));
         }
         let mut signal = frame;
         for l in 1..=levels {
             signal = signal.downsampled(self.across);
-            let kernels = kernels
-                .coarse
-                .blurs()
-                .map(|b| projected(&b.taps(l), self.across));
-            let kernels: Vec<_> = kernels.collect();
-            for ([x, y], columns) in pixels.iter().zip(&mut to.columns[first..]) {
-                let from = projected(
-                    &product(&interpolation(*x, l), &interpolation(*y, l)),
-                    self.across,
-                );
-                for kernel in &kernels {
-                    let sum = from.iter().map(|(k, w)| w * signal.sum(*k, kernel));
-                    columns.push(sum.sum());
-                }
+            let from: Vec<_> = pixels
+                .iter()
+                .map(|[x, y]| {
+                    projected(
+                        &product(&interpolation(*x, l), &interpolation(*y, l)),
+                        self.across,
+                    )
+                })
+                .collect();
+            for blur in kernels.coarse.blurs() {
+                let taps = projected(&blur.taps(l), self.across);
+                let mean = |from: &Vec<(i32, f64)>| {
+                    from.iter().map(|(k, w)| w * signal.sum(*k, &taps)).sum()
+                };
+                add(&mut from.iter().map(mean));
             }
         }
     }
@@ -324,6 +316,25 @@ impl Edge {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lattices_have_the_variance_of_the_shader() {
+        let shader = crate::exact::gaussian_sum::SHADER;
+        let variances: Vec<f32> = (0..=40)
+            .map(|i| 1e-3 * 399f32.powf(i as f32 / 40.0))
+            .collect();
+        let inputs: Vec<_> = variances.iter().map(|v| [*v, 1.0, 0.0, 0.0]).collect();
+        let call = "vec4f(lattice_variance(x.x, x.y), 0.0, 0.0, 0.0)";
+        let found = crate::wgsl::evaluate(shader, call, &inputs);
+        for (v, [found, ..]) in variances.iter().zip(found) {
+            let wanted = lattice_variance(f64::from(*v));
+            // 1 − e^(−ω²v/2) of a single float, from which all follows, has a digit less for each that v is
+            // below 1.
+            let allowed = 1e-5 + 2e-7 / f64::from(*v);
+            let off = (f64::from(found) / wanted - 1.0).abs();
+            assert!(off < allowed, "{v} px²: {found}, {wanted}");
+        }
+    }
     use crate::plan::KERNELS;
 
     #[test]
@@ -338,31 +349,23 @@ mod tests {
             // One pixel after the other along a row.
             let pixels: Vec<_> = (-160..160).map(|x| [x, 0]).collect();
             for kernels in KERNELS {
+                let variances = kernels.variances_px2(3);
                 let mut passed = Responses {
                     samples: Vec::new(),
-                    columns: Vec::new(),
+                    columns: vec![Vec::new(); variances.len()],
                 };
                 edge.pass(&kernels, 3, &pixels, &mut passed);
-                let fine = kernels.fine.blurs().map(|b| b.variance_px2);
-                let coarse = |l| {
-                    let blurs = kernels.coarse.blurs();
-                    blurs.map(move |b| b.variance_px2 * f64::powi(4.0, l))
-                };
-                let wanted = [0.0]
-                    .into_iter()
-                    .chain(fine)
-                    .chain((1..=3).flat_map(coarse));
-                for (j, variance) in wanted.enumerate() {
-                    let differences = passed.columns.windows(2).zip(passed.samples.windows(2));
+                // Differences of neighbours see the edge through the step between them.
+                let between = (passed.samples[1].x - passed.samples[0].x).powi(2) / 12.0;
+                for (column, variance) in passed.columns.iter().zip(variances) {
+                    let differences = column.windows(2).zip(passed.samples.windows(2));
                     let moment: f64 = differences
-                        .map(|(c, s)| (c[1][j] - c[0][j]) * (0.5 * (s[0].x + s[1].x)).powi(2))
+                        .map(|(c, s)| (c[1] - c[0]) * (0.5 * (s[0].x + s[1].x)).powi(2))
                         .sum();
-                    // Differences of neighbours see the edge through the step between them.
-                    let between = (passed.samples[1].x - passed.samples[0].x).powi(2) / 12.0;
                     let found = moment - 1.0 - between;
                     assert!(
                         (found - variance).abs() < 0.02 * variance + 1e-3,
-                        "{across:?}, {j}: {found} for {variance}"
+                        "{across:?}: {found} for {variance}"
                     );
                 }
             }

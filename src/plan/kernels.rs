@@ -12,7 +12,7 @@ pub(crate) enum Shape {
 }
 
 impl Shape {
-    pub fn count(self) -> usize {
+    pub(crate) fn count(self) -> usize {
         match self {
             Self::Nine => 9,
             Self::Thirteen => 13,
@@ -29,7 +29,7 @@ impl Shape {
     }
 
     /// The variance of equal weights, which no others exceed.
-    pub fn limit(self) -> f64 {
+    pub(crate) fn limit(self) -> f64 {
         match self {
             Self::Nine => 2.0 / 3.0,
             Self::Thirteen => 14.0 / 13.0,
@@ -38,7 +38,7 @@ impl Shape {
     }
 
     /// Up to which variance a blur is no more than its three innermost columns.
-    pub fn narrow(self) -> f64 {
+    pub(crate) fn narrow(self) -> f64 {
         if self == Self::Nine {
             self.limit()
         } else {
@@ -48,7 +48,7 @@ impl Shape {
 
     /// `Blur::sharpness` of surface.wgsl: fitted to [`Shape::exponent`] from [`Shape::narrow`] to .97 of
     /// the limit.
-    pub fn sharpness(self) -> [f64; 4] {
+    pub(crate) fn sharpness(self) -> [f64; 4] {
         match self {
             Self::Nine => [0.0; 4],
             Self::Thirteen => [-0.1746, 1.8812, -0.0573, 0.8913],
@@ -91,7 +91,7 @@ pub(crate) struct Blur {
 
 impl Blur {
     /// What it weighs on level `l`.
-    pub fn taps(&self, l: usize) -> Taps {
+    pub(crate) fn taps(&self, l: usize) -> Taps {
         let variance = self.variance_px2 - own_blur(l);
         self.shape.taps(self.shape.exponent(variance))
     }
@@ -99,7 +99,7 @@ impl Blur {
 
 impl Shape {
     /// The q of weights exp(−r²/2q) that have `variance` when they are cut off.
-    pub fn exponent(self, variance: f64) -> f64 {
+    pub(crate) fn exponent(self, variance: f64) -> f64 {
         let (mut low, mut high) = (1e-2, 1e3);
         for _ in 0..60 {
             let middle = f64::sqrt(low * high);
@@ -124,7 +124,7 @@ pub(crate) struct Kinds {
 
 impl Kinds {
     /// All of them, the square one last.
-    pub fn blurs(&self) -> impl Iterator<Item = Blur> {
+    pub(crate) fn blurs(&self) -> impl Iterator<Item = Blur> {
         let blur = |shape| {
             move |variance_px2| Blur {
                 variance_px2,
@@ -135,7 +135,7 @@ impl Kinds {
         shared.chain(self.square_px2.map(blur(Shape::Square)))
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.variances_px2.len() + usize::from(self.square_px2.is_some())
     }
 }
@@ -151,7 +151,7 @@ pub(crate) struct Kernels {
 impl Kernels {
     /// Of the light that stays, of each blur of the frame, then of each of level 1 and so on: its variance in
     /// square pixels of the frame.
-    pub fn variances_px2(&self, levels: usize) -> Vec<f64> {
+    pub(crate) fn variances_px2(&self, levels: usize) -> Vec<f64> {
         let mut variances = vec![0.0];
         variances.extend(self.fine.blurs().map(|b| b.variance_px2));
         for l in 1..=levels as i32 {

@@ -13,6 +13,7 @@ pub mod output;
 mod page;
 pub mod renderer;
 mod rivals;
+mod srgb;
 pub mod stability;
 mod svg;
 pub mod synthetic;

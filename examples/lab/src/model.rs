@@ -3,6 +3,7 @@
 use std::io::Cursor;
 use std::ops::Range;
 
+use glam::Vec3;
 use image::{ImageFormat, RgbImage};
 use serde_json::{Value, json};
 use subsurface::Profile;
@@ -134,82 +135,76 @@ pub fn picture(format: ImageFormat) -> Vec<u8> {
 
 /// What of a scene is not as its documentation says.
 pub fn flaw_of_scene(scene: &Scene) -> Option<String> {
-    if scene.primitives.is_empty() {
-        return Some("no primitives".into());
-    }
-    for (i, image) in scene.images.iter().enumerate() {
+    let unit = |x: &f32| (0.0..=1.0).contains(x);
+    let image = scene.images.iter().find(|image| {
         let pixels = image.width as usize * image.height as usize;
-        if pixels == 0 || image.rgba8.len() != 4 * pixels {
-            return Some(format!("image {i} has {} bytes", image.rgba8.len()));
-        }
-    }
-    for m in &scene.materials {
+        pixels == 0 || image.rgba8.len() != 4 * pixels
+    });
+    let material = scene.materials.iter().find(|m| {
         let textures = [m.base_color_texture, m.normal_texture];
-        let unit = |x: f32| (0.0..=1.0).contains(&x);
-        let numbers = m
-            .base_color
-            .into_iter()
-            .chain([m.roughness, m.alpha_cutoff]);
-        if textures.iter().flatten().any(|t| *t >= scene.images.len())
-            || !numbers.into_iter().all(unit)
+        textures.iter().flatten().any(|t| *t >= scene.images.len())
+            || !m
+                .base_color
+                .iter()
+                .chain([&m.roughness, &m.alpha_cutoff])
+                .all(unit)
             || !m.normal_scale.is_finite()
-        {
-            return Some(format!("{m:?}"));
-        }
-    }
-    scene.primitives.iter().find_map(|p| {
-        let flaw = if p.material >= scene.materials.len() {
-            Some("no material".into())
-        } else {
+    });
+    let primitive = scene.primitives.iter().find_map(|p| {
+        let has_material = p.material < scene.materials.len();
+        let flaw = if has_material {
             flaw_of_primitive(p)
+        } else {
+            Some("no material".into())
         };
-        flaw.map(|f| format!("{}: {f}", p.name))
-    })
+        flaw.map(|flaw| format!("{}: {flaw}", p.name))
+    });
+    let nothing = scene.primitives.is_empty().then(|| "no primitives".into());
+    nothing
+        .or(image
+            .map(|image| format!("{}x{} pixels that are not there", image.width, image.height)))
+        .or(material.map(|m| format!("{m:?}")))
+        .or(primitive)
 }
 
 fn flaw_of_primitive(p: &Primitive) -> Option<String> {
-    let unit = |v: &[f32]| {
-        let length = v.iter().map(|x| x * x).sum::<f32>().sqrt();
-        (length - 1.0).abs() < 1e-3
-    };
+    let is_unit = |v: &[f32]| (v.iter().map(|x| x * x).sum::<f32>().sqrt() - 1.0).abs() < 1e-3;
     let inside = |v: &[f32]| v.iter().all(|x| (0.0..=1.0).contains(x));
-    for (i, v) in p.vertices.iter().enumerate() {
-        if !bytemuck::cast_slice::<_, f32>(&[*v])
+    let vertex = p.vertices.iter().find(|v| {
+        let finite = bytemuck::cast_slice::<_, f32>(std::slice::from_ref(*v))
             .iter()
-            .all(|x| x.is_finite())
-            || !unit(&v.normal)
-            || !unit(&v.tangent[..3])
-            || v.tangent[3].abs() != 1.0
-            || !inside(&v.atlas_uv)
-            || !inside(&v.mask)
-        {
-            return Some(format!("vertex {i}: {v:?}"));
-        }
-    }
-    if p.indices.is_empty() || !p.indices.len().is_multiple_of(3) {
-        return Some(format!("{} indices", p.indices.len()));
-    }
-    if let Some(i) = p.indices.iter().find(|i| **i as usize >= p.vertices.len()) {
-        return Some(format!("index {i} of {} vertices", p.vertices.len()));
-    }
-    let mut end = 0;
-    for page in &p.pages {
-        if page.start != end || page.is_empty() {
-            return Some(format!("pages {:?}", p.pages));
-        }
-        end = page.end;
-    }
-    (!p.pages.is_empty() && end as usize != p.indices.len()).then(|| format!("pages to {end}"))
+            .all(|x| x.is_finite());
+        let directed = is_unit(&v.normal) && is_unit(&v.tangent[..3]) && v.tangent[3].abs() == 1.0;
+        !finite || !directed || !inside(&v.atlas_uv) || !inside(&v.mask)
+    });
+    let index = p.indices.iter().find(|i| **i as usize >= p.vertices.len());
+    let count = p.indices.is_empty() || !p.indices.len().is_multiple_of(3);
+    // Pages follow on each other and hold all indices, if there are any.
+    let ends = [0].into_iter().chain(p.pages.iter().map(|page| page.end));
+    let apart = p
+        .pages
+        .iter()
+        .zip(ends)
+        .any(|(page, end)| page.start != end || page.is_empty());
+    let short = p
+        .pages
+        .last()
+        .is_some_and(|page| page.end as usize != p.indices.len());
+    vertex
+        .map(|v| format!("{v:?}"))
+        .or(index.map(|i| format!("index {i} of {} vertices", p.vertices.len())))
+        .or(count.then(|| format!("{} indices", p.indices.len())))
+        .or((apart || short).then(|| format!("pages {:?}", p.pages)))
 }
 
 /// What of a profile is not as its documentation says.
 pub fn flaw_of_profile(profile: &Profile) -> Option<String> {
     let gaussians = profile.gaussians();
-    let fits = gaussians.iter().all(|g| {
-        let numbers = g.weight.into_iter().chain([g.variance_mm2]);
-        numbers.into_iter().all(|x| x.is_finite() && x >= 0.0)
-    });
-    let sum: glam::Vec3 = gaussians.iter().map(|g| glam::Vec3::from(g.weight)).sum();
+    let numbers = gaussians
+        .iter()
+        .flat_map(|g| g.weight.into_iter().chain([g.variance_mm2]));
+    let fits = !gaussians.is_empty() && numbers.into_iter().all(|x| x.is_finite() && x >= 0.0);
+    let sum: Vec3 = gaussians.iter().map(|g| Vec3::from(g.weight)).sum();
     let whole = (sum - 1.0).abs().max_element() < 1e-5;
-    (!fits || !whole || gaussians.is_empty()).then(|| format!("{profile:?}"))
+    (!fits || !whole).then(|| format!("{profile:?}"))
 }

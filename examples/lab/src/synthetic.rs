@@ -98,22 +98,23 @@ impl View {
     /// The G-buffer of what `hit` finds along each ray.
     pub fn shoot(&self, hit: impl Fn(DVec3, DVec3) -> Option<Hit>) -> GBuffer {
         let mut hits = Vec::new();
-        let mut areas = Vec::new();
+        let mut steps = Vec::new();
         let mut pixels_mm2 = Vec::new();
         for y in 0..self.size[1] {
             for x in 0..self.size[0] {
                 let at = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
                 let (origin, ray) = self.ray(at);
                 let found = hit(origin, ray);
-                areas.push(found.map_or(0.0, |h| {
-                    // The pixel's corners on the tangent plane.
+                steps.push(found.map_or([DVec3::ZERO; 2], |h| {
+                    // Between the pixel's sides on the tangent plane.
                     let on_plane = |dx: f64, dy: f64| {
                         let (o, d) = self.ray(at + DVec2::new(dx, dy));
                         o + d * ((h.point - o).dot(h.normal) / d.dot(h.normal))
                     };
-                    let du = on_plane(0.5, 0.0) - on_plane(-0.5, 0.0);
-                    let dv = on_plane(0.0, 0.5) - on_plane(0.0, -0.5);
-                    du.cross(dv).length()
+                    [
+                        on_plane(0.5, 0.0) - on_plane(-0.5, 0.0),
+                        on_plane(0.0, 0.5) - on_plane(0.0, -0.5),
+                    ]
                 }));
                 pixels_mm2.push(found.map_or(0.0, |h| {
                     let facing = |dx: f64, dy: f64| {
@@ -130,17 +131,18 @@ impl View {
         GBuffer {
             view: *self,
             hits,
-            areas,
+            steps,
             pixels_mm2,
         }
     }
 }
 
-/// Per pixel what is seen, its area in mm², and its area were it to face the camera.
+/// Per pixel what is seen, the steps in mm on its tangent plane to the next in the row and in the column, and
+/// its area in mm² were it to face the camera.
 pub struct GBuffer {
     pub view: View,
     pub hits: Vec<Option<Hit>>,
-    pub areas: Vec<f64>,
+    pub steps: Vec<[DVec3; 2]>,
     pub pixels_mm2: Vec<f64>,
 }
 
@@ -202,10 +204,10 @@ impl GBuffer {
                 patch: Patch {
                     // From what is looked at, which leaves single floats their digits.
                     point_mm: (hit.point - on_surface[0].1.point).as_vec3(),
-                    area_mm2: self.areas[*i] as f32,
+                    area_mm2: self.steps[*i][0].cross(self.steps[*i][1]).length() as f32,
                     irradiance: hit.irradiance.as_vec3(),
                 },
-                facing_mm2: self.pixels_mm2[*i] as f32,
+                steps_mm: self.steps[*i].map(|step| step.as_vec3()),
             })
             .collect();
         let place = |i| on_surface.partition_point(|(j, _)| j < i);

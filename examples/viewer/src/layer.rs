@@ -9,7 +9,7 @@ pub enum Layer {
     Texture,
     /// Scattered on the screen by a plan.
     Screen,
-    /// Scattered on the screen by exact sums.
+    /// Scattered on the screen by the exact sum.
     Exact,
     /// How wide the kernel is, in false colours.
     Width,

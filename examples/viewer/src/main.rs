@@ -24,6 +24,7 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use subsurface::wgpu::Features;
 use subsurface_lab::Error;
 use subsurface_lab::renderer::{Camera, Gpu, Scene, View};
 use winit::application::ApplicationHandler;
@@ -62,7 +63,7 @@ fn view(options: Options) -> Result<(), Error> {
             Scene::from_glb(subsurface_lab::HEAD)?,
         ),
     };
-    let gpu = Gpu::headless()?;
+    let gpu = Gpu::with(Features::TIMESTAMP_QUERY)?;
     let event_loop = EventLoop::with_user_event()
         .build()
         .map_err(|e| window::no_window(&e))?;

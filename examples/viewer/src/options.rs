@@ -26,7 +26,7 @@ Keys:
                       split, width of the kernel, level of the plan
   H                   half resolution
   T                   takes the time of each pass of what is shown
-  M                   measures the error against the exact effect
+  M                   measures the error against the exact sum
   R                   goes back to the first view and light
   S                   saves the picture, without the panel, as viewer-NNN.png
   Escape              quits

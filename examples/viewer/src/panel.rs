@@ -4,7 +4,6 @@ use egui::{Button, ComboBox, Grid, RichText, ScrollArea, Slider, Ui};
 
 use crate::layer::{Layer, Mode};
 use crate::passes::Pass;
-use crate::stage::PassTimes;
 use crate::viewer::Viewer;
 
 /// In points.
@@ -133,12 +132,16 @@ fn times(ui: &mut Ui, viewer: &mut Viewer) {
 }
 
 /// Two passes to a line.
-fn passes(ui: &mut Ui, layer: Layer, times: &PassTimes) {
-    let sum: f64 = times.passes.iter().map(|pass| pass.ms).sum();
+fn passes(ui: &mut Ui, layer: Layer, passes: &[Pass]) {
+    if passes.is_empty() {
+        ui.small("the device has no timestamps");
+        return;
+    }
+    let sum: f64 = passes.iter().map(|pass| pass.ms).sum();
     ui.label(format!("{}, by pass: {}", layer.title(), number(sum)));
     let grid = Grid::new(layer).spacing([6.0, 2.0]);
     grid.min_row_height(0.0).show(ui, |ui| {
-        for pair in times.passes.chunks(2) {
+        for pair in passes.chunks(2) {
             for Pass { name, ms } in pair {
                 ui.small(name);
                 ui.small(number(*ms));
@@ -146,10 +149,7 @@ fn passes(ui: &mut Ui, layer: Layer, times: &PassTimes) {
             ui.end_row();
         }
     });
-    ui.small(format!(
-        "Each submitted alone and waited for; with nothing to do that takes {}.",
-        number(times.empty_ms)
-    ));
+    ui.small("By the device's timestamps; some software drivers report half of them.");
 }
 
 fn plan(ui: &mut Ui, viewer: &Viewer) {

@@ -1,53 +1,45 @@
-//! What each pass of an effect takes.
+//! What each pass of an effect takes on the device.
 
-use std::time::Instant;
-
-use subsurface::wgpu::CommandEncoder;
-use subsurface_lab::renderer::Gpu;
+use subsurface::View;
+use subsurface::wgpu::{CommandEncoder, QuerySet};
+use subsurface_lab::Error;
+use subsurface_lab::renderer::{Gpu, Timestamps};
 
 /// One pass.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pass {
     pub name: String,
-    /// Wall clock, from recording it to the end of the wait.
     pub ms: f64,
 }
 
-/// How what an effect records is submitted.
-pub enum Submission {
-    AtOnce,
-    /// Each pass alone, and waited for. Timestamps would tell it without, but are a feature that devices
-    /// may lack, and software drivers misreport them.
-    ByPass(Vec<Pass>),
-}
-
-impl Submission {
-    /// Submits what `render` records and waits until it is done; `render` is to call what it is handed
-    /// after each of its passes.
-    pub fn run(
-        &mut self,
-        gpu: &Gpu,
-        render: impl FnOnce(&mut CommandEncoder, &mut dyn FnMut(&str, &mut CommandEncoder)),
-    ) {
-        gpu.run(|encoder| match self {
-            Self::AtOnce => render(encoder, &mut |_, _| ()),
-            Self::ByPass(passes) => {
-                let mut since = Instant::now();
-                render(encoder, &mut |label, recorded| {
-                    gpu.run(|empty| std::mem::swap(empty, recorded));
-                    add(passes, label, since.elapsed().as_secs_f64() * 1e3);
-                    since = Instant::now();
-                });
-            }
-        });
+/// Submits what `record` records and waits until it is done; where `times` are asked for, adds those of its
+/// passes. `record` is handed the queries for them, and returns the passes' labels.
+pub fn run(
+    gpu: &Gpu,
+    times: Option<(&Timestamps, &mut Vec<Pass>)>,
+    record: impl FnOnce(
+        &mut CommandEncoder,
+        Option<&QuerySet>,
+    ) -> Result<Vec<String>, subsurface::Error>,
+) -> Result<(), Error> {
+    let Some((timestamps, passes)) = times else {
+        gpu.run(|encoder| record(encoder, None))?;
+        return Ok(());
+    };
+    let (labels, times) = timestamps.run(gpu, |encoder| {
+        let labels = record(encoder, Some(&timestamps.queries));
+        let count = labels.as_ref().map_or(0, |labels| 2 * labels.len() as u32);
+        (labels, count)
+    });
+    for (label, time) in labels?.iter().zip(times.chunks_exact(2)) {
+        add(passes, label, time[1] - time[0]);
     }
+    Ok(())
 }
 
-/// What a submission takes that has nothing to do: the least that a pass of [`Submission::ByPass`] can.
-pub fn empty_ms(gpu: &Gpu) -> f64 {
-    let since = Instant::now();
-    gpu.run(|_| ());
-    since.elapsed().as_secs_f64() * 1e3
+/// Enough queries for any effect; none where the device has no timestamps.
+pub fn timestamps(gpu: &Gpu) -> Option<Timestamps> {
+    Timestamps::new(gpu, 2 * View::MAX_PASSES)
 }
 
 /// An effect that runs several times, for the parts of an atlas, is told as one.
@@ -66,6 +58,7 @@ fn add(passes: &mut Vec<Pass>, label: &str, ms: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use subsurface::wgpu::Features;
 
     #[test]
     fn passes_of_a_name_are_added_up() {
@@ -85,37 +78,25 @@ mod tests {
     }
 
     #[test]
-    fn each_pass_is_submitted_once() {
-        let gpu = Gpu::headless().unwrap();
-        for mut submission in [Submission::AtOnce, Submission::ByPass(Vec::new())] {
-            let size = 4;
-            let buffer = |usage| {
-                gpu.device
-                    .create_buffer(&subsurface::wgpu::BufferDescriptor {
-                        label: None,
-                        size,
-                        usage,
-                        mapped_at_creation: false,
-                    })
-            };
-            use subsurface::wgpu::BufferUsages as Usage;
-            let [from, to] =
-                [Usage::COPY_SRC, Usage::MAP_READ].map(|u| buffer(u | Usage::COPY_DST));
-            gpu.queue.write_buffer(&from, 0, &[7; 4]);
-            submission.run(&gpu, |encoder, after| {
-                encoder.copy_buffer_to_buffer(&from, 0, &to, 0, size);
-                after("effect first", encoder);
-                encoder.clear_buffer(&from, 0, None);
-                after("effect second", encoder);
-            });
-            to.map_async(subsurface::wgpu::MapMode::Read, .., |result| {
-                result.unwrap();
-            });
-            gpu.run(|_| ());
-            assert_eq!(&to.get_mapped_range(..).unwrap()[..], [7; 4]);
-            if let Submission::ByPass(passes) = submission {
-                assert_eq!(passes.len(), 2);
-            }
-        }
+    fn the_device_is_asked_for_the_times_of_what_is_recorded() {
+        let gpu = Gpu::with(Features::TIMESTAMP_QUERY).unwrap();
+        let Some(timestamps) = timestamps(&gpu) else {
+            return; // A device without them is not asked.
+        };
+        let mut passes = Vec::new();
+        run(
+            &gpu,
+            Some((&timestamps, &mut passes)),
+            |encoder, queries| {
+                assert!(queries.is_some());
+                for query in 0..4 {
+                    timestamps.mark(encoder, query);
+                }
+                Ok(vec!["effect first".into(), "effect second".into()])
+            },
+        )
+        .unwrap();
+        assert_eq!([&passes[0].name, &passes[1].name], ["first", "second"]);
+        assert!(passes.iter().all(|pass| pass.ms >= 0.0 && pass.ms < 1000.0));
     }
 }

@@ -1,4 +1,4 @@
-//! Plans, fitted on a thread of their own: each takes seconds.
+//! Plans, fitted on a thread of their own.
 
 use std::sync::Arc;
 use std::thread;
@@ -54,7 +54,7 @@ impl Planner {
         let done = Arc::clone(&self.done);
         thread::spawn(move || {
             let since = Instant::now();
-            let plan = Plan::new(&[wish.profile], wish.max_error);
+            let plan = Plan::new(&[wish.profile], wish.max_error).map_err(Error::from);
             let seconds = since.elapsed().as_secs_f64();
             done(Fitted {
                 wish,
@@ -114,8 +114,11 @@ mod tests {
         planner.ask(wish(0.2));
         assert!(!planner.is_fitting());
 
-        planner.ask(wish(-1.0));
-        planner.take(fits.recv().unwrap());
-        assert!(planner.error.is_some() && error(&planner) == Some(0.2));
+        // What no plan keeps is refused, as what is no error is.
+        for refused in [1e-6, -1.0] {
+            planner.ask(wish(refused));
+            planner.take(fits.recv().unwrap());
+            assert!(planner.error.is_some() && error(&planner) == Some(0.2));
+        }
     }
 }

@@ -3,22 +3,24 @@
 //! device and thread, the window would wait for it.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 use image::RgbImage;
 use subsurface::wgpu::TextureView;
-use subsurface::{Atlas, Frame, Plan, Profile, ScreenSpace, TextureSpace, View};
+use subsurface::{Atlas, Plan, Profile, ScreenSpace, TextureSpace};
 use subsurface_lab::Error;
+use subsurface_lab::method::Ours;
 use subsurface_lab::metrics;
 use subsurface_lab::renderer::{
-    AtlasRenderer, Camera, Gpu, Layer as Shown, Lighting, Renderer, Scene,
+    AtlasRenderer, Camera, Gpu, Layer as Shown, Lighting, Renderer, Scene, Timestamps,
 };
 
 use crate::layer::Layer;
 use crate::legend::Legend;
-use crate::passes::{Pass, Submission};
+use crate::passes::Pass;
 use crate::{level, passes, width};
 
 /// While the view moves, effects that took longer wait until it rests.
@@ -44,7 +46,7 @@ pub struct Request {
     /// Counts them.
     pub number: u64,
     pub look: Look,
-    /// Errors against the exact effect, too.
+    /// Errors against the exact sum, too.
     pub measure: bool,
     /// The time of each pass of what is shown, too.
     pub time_passes: bool,
@@ -69,14 +71,6 @@ pub struct Time {
     pub is_first: bool,
 }
 
-/// What the passes of an effect took.
-#[derive(Clone, Debug)]
-pub struct PassTimes {
-    pub passes: Vec<Pass>,
-    /// How much of each is the submission itself.
-    pub empty_ms: f64,
-}
-
 /// The answer to a request.
 pub struct Frame {
     /// That of its request.
@@ -90,8 +84,8 @@ pub struct Frame {
     /// Of the effects that this view has been scattered by.
     pub times: Vec<Time>,
     /// Of those whose passes were timed for this view.
-    pub passes: Vec<(Layer, PassTimes)>,
-    /// Relative RMSE against the exact effect, where it was measured for this view.
+    pub passes: Vec<(Layer, Vec<Pass>)>,
+    /// Relative RMSE against the exact sum, where it was measured for this view.
     pub errors: Vec<(Layer, Option<f64>)>,
 }
 
@@ -108,7 +102,10 @@ impl Stage {
     /// Answers requests until there are no more: the newest, and none that is older.
     pub fn run(self, requests: Receiver<Request>, answer: impl Fn(Result<Frame, Error>)) {
         let mut set = None;
-        let mut effects = Effects::default();
+        let mut effects = Effects {
+            timestamps: passes::timestamps(&self.gpu),
+            ..Default::default()
+        };
         while let Ok(mut request) = requests.recv() {
             while let Ok(newer) = requests.try_recv() {
                 request = Request {
@@ -169,9 +166,10 @@ impl Stage {
 /// Made when they are first asked for, and kept over changes of size: a driver may compile for seconds.
 #[derive(Default)]
 struct Effects {
-    screen: Option<PlannedScreenSpace>,
-    exact: Option<ScreenSpace>,
-    texture: Option<TextureSpace>,
+    /// None where the device has none.
+    timestamps: Option<Timestamps>,
+    screen: HashMap<Layer, Ours>,
+    texture: Option<(Profile, TextureSpace)>,
     /// What each took last.
     last_ms: HashMap<Layer, f64>,
 }
@@ -204,7 +202,7 @@ struct Shot {
     /// Scattered, or as it fell; none behind false colours.
     irradiance: Option<TextureView>,
     time: Option<Time>,
-    passes: Option<PassTimes>,
+    passes: Option<Vec<Pass>>,
 }
 
 /// What an effect leaves.
@@ -278,11 +276,8 @@ impl Set {
         let last_ms = effects.last_ms.get(&layer).copied().unwrap_or(0.0);
         let is_known = self.view.shots.contains_key(&layer);
         let is_planned = matches!(layer, Layer::Screen | Layer::Level);
-        let is_exact = look.plan.as_ref().is_some_and(|plan| plan.is_exact());
         let why = if is_planned && look.plan.is_none() {
-            "the plan is being fitted".to_owned()
-        } else if layer == Layer::Level && is_exact {
-            "the plan is the exact effect, which has no levels".to_owned()
+            "no plan is fitted yet".to_owned()
         } else if look.is_moving && last_ms > PATIENCE_MS && !is_known {
             format!("{} follows at rest", layer.title())
         } else {
@@ -326,12 +321,11 @@ impl Set {
         look: &Look,
         layer: Layer,
     ) -> Result<Shot, Error> {
-        let at_once = &mut Submission::AtOnce;
         let Scattered {
             title,
             irradiance,
             taken_ms,
-        } = self.run_effect(stage, effects, look, layer, at_once)?;
+        } = self.run_effect(stage, effects, look, layer, None)?;
         let time = taken_ms.map(|ms| Time {
             layer,
             ms,
@@ -354,7 +348,7 @@ impl Set {
         })
     }
 
-    /// Runs the effects that are shown once more, pass by pass.
+    /// Runs the effects that are shown once more, and has the device time their passes.
     fn time_passes(
         &mut self,
         stage: &Stage,
@@ -366,101 +360,94 @@ impl Set {
             if !self.view.shots.contains_key(layer) {
                 continue;
             }
-            let empty_ms = passes::empty_ms(&stage.gpu);
-            let mut by_pass = Submission::ByPass(Vec::new());
-            self.run_effect(stage, effects, look, *layer, &mut by_pass)?;
-            if let (Submission::ByPass(passes), Some(shot)) =
-                (by_pass, self.view.shots.get_mut(layer))
-            {
-                shot.passes = Some(PassTimes { passes, empty_ms });
+            let mut passes = Vec::new();
+            self.run_effect(stage, effects, look, *layer, Some(&mut passes))?;
+            if let Some(shot) = self.view.shots.get_mut(layer) {
+                shot.passes = Some(passes);
             }
         }
         Ok(())
     }
 
+    /// `passes` takes the times of the effect's passes, where they are asked for and the device has them.
     fn run_effect(
         &mut self,
         stage: &Stage,
         effects: &mut Effects,
         look: &Look,
         layer: Layer,
-        submission: &mut Submission,
+        mut passes: Option<&mut Vec<Pass>>,
     ) -> Result<Scattered, Error> {
         let (gpu, renderer) = (&stage.gpu, &self.renderer);
         let fallen = &renderer.gbuffer.irradiance;
-        let output = match layer {
-            Layer::None => fallen,
-            _ => self
-                .outputs
-                .entry(layer)
-                .or_insert_with(|| renderer.scattered_target(gpu)),
-        };
-        let profiles = [look.profile];
-        let frame = ScreenFrame {
-            irradiance: fallen,
-            depth: &renderer.gbuffer.depth,
-            profile_id: Some(&renderer.gbuffer.profile_id),
-            normal: None,
-            strength: None,
-            viewport: None,
-            output,
-            projection: look.camera.projection(self.size),
-            mm_per_unit: stage.mm_per_unit,
-            profiles: &profiles,
-        };
-        let format = output.texture().format();
         let mut title = layer.title().to_owned();
-        let taken_ms = match layer {
-            Layer::None | Layer::Width | Layer::Level => None,
-            Layer::Screen => match &look.plan {
-                None => None,
-                Some(plan) => {
-                    title = match plan.is_exact() {
-                        true => format!("{title}: exact"),
-                        false => format!("{title} at {:.4}", plan.max_error()),
-                    };
-                    let since = Instant::now();
-                    let frame = ScreenFrame {
-                        profiles: plan.profiles(),
-                        ..frame
-                    };
-                    let effect = made(&mut effects.screen, || {
-                        PlannedScreenSpace::new(&gpu.device, format)
-                    })?;
-                    effect.prepare(&gpu.device, &gpu.queue, &frame, plan)?;
-                    submission.run(gpu, |encoder, after| effect.render_by_pass(encoder, after));
-                    Some(ms(since))
-                }
-            },
-            Layer::Exact => {
-                let since = Instant::now();
-                let effect = made(&mut effects.exact, || ScreenSpace::new(&gpu.device, format))?;
-                effect.prepare(&gpu.device, &frame)?;
-                submission.run(gpu, |encoder, after| effect.render_by_pass(encoder, after));
-                Some(ms(since))
+        let plan = match (layer, &look.plan) {
+            (Layer::Screen, Some(plan)) => {
+                title = format!("{title} at {:.4}", plan.max_error());
+                Some((**plan).clone())
             }
-            Layer::Texture => {
-                title = format!("{title}, {0}×{0}", stage.texture_size);
-                let since = Instant::now();
-                let effect = made(&mut effects.texture, || {
-                    TextureSpace::new(&gpu.device, format)
-                })?;
-                let atlas = made(&mut self.atlas, || {
-                    AtlasRenderer::new(gpu, renderer, stage.texture_size)
-                })?;
-                let scatter = |atlas: &Atlas| {
-                    effect.prepare(&gpu.device, atlas)?;
-                    submission.run(gpu, |encoder, after| effect.render_by_pass(encoder, after));
-                    Ok(())
-                };
-                atlas.render(gpu, renderer, &profiles, stage.mm_per_unit, output, scatter)?;
-                Some(ms(since))
+            (Layer::Exact, _) => Some(Plan::exact(&[look.profile])?),
+            (Layer::Texture, _) => None,
+            _ => {
+                return Ok(Scattered {
+                    title,
+                    irradiance: fallen.clone(),
+                    taken_ms: None,
+                });
             }
         };
+        let output = self
+            .outputs
+            .entry(layer)
+            .or_insert_with(|| renderer.scattered_target(gpu));
+        let format = output.texture().format();
+        let since = Instant::now();
+        match plan {
+            Some(plan) => {
+                let ours = match effects.screen.entry(layer) {
+                    Entry::Occupied(kept) => kept.into_mut(),
+                    Entry::Vacant(none) => none.insert(Ours::new(&gpu.device, format, &plan)?),
+                };
+                if *ours.effect.plan() != plan {
+                    ours.effect = ScreenSpace::new(&gpu.device, format, &plan)?;
+                }
+                let projection = look.camera.projection(self.size);
+                let frame = renderer.gbuffer.frame(projection, stage.mm_per_unit);
+                let Ours { effect, view } = ours;
+                view.prepare(&gpu.device, &gpu.queue, effect, &frame)?;
+                let times = effects.timestamps.as_ref().zip(passes);
+                passes::run(gpu, times, |encoder, queries| match queries {
+                    Some(queries) => view.render_timed(encoder, output, queries, 0),
+                    None => view.render(encoder, output).map(|()| Vec::new()),
+                })?;
+            }
+            None => {
+                title = format!("{title}, {0}×{0}", stage.texture_size);
+                let effect = match effects.texture.take() {
+                    Some((profile, effect)) if profile == look.profile => effect,
+                    _ => TextureSpace::new(&gpu.device, format, &[look.profile])?,
+                };
+                let (_, effect) = effects.texture.insert((look.profile, effect));
+                if self.atlas.is_none() {
+                    self.atlas = Some(AtlasRenderer::new(gpu, renderer, stage.texture_size)?);
+                }
+                let scatter = |atlas: &Atlas, to: &TextureView| {
+                    effect.prepare(&gpu.device, &gpu.queue, atlas)?;
+                    let times = effects.timestamps.as_ref().zip(passes.as_deref_mut());
+                    passes::run(gpu, times, |encoder, queries| match queries {
+                        Some(queries) => effect.render_timed(encoder, to, queries, 0),
+                        None => effect.render(encoder, to).map(|()| Vec::new()),
+                    })
+                };
+                if let Some(atlas) = &self.atlas {
+                    atlas.render(gpu, renderer, 1, stage.mm_per_unit, output, scatter)?;
+                }
+            }
+        }
         Ok(Scattered {
             title,
             irradiance: output.clone(),
-            taken_ms,
+            taken_ms: Some(ms(since)),
         })
     }
 
@@ -498,7 +485,7 @@ impl Set {
         })
     }
 
-    /// Holds what is cheap, and what is there, to the exact effect.
+    /// Holds what is cheap, and what is there, to the exact sum.
     fn measure(&mut self, stage: &Stage, effects: &mut Effects, look: &Look) -> Result<(), Error> {
         let mut layers = vec![Layer::None];
         if self.view.shots.contains_key(&Layer::Texture) {
@@ -540,14 +527,6 @@ impl Set {
         let ids = stage.gpu.read_bytes(ids);
         ids.into_iter().map(|id| id == 1).collect()
     }
-}
-
-fn made<T>(kept: &mut Option<T>, make: impl FnOnce() -> Result<T, Error>) -> Result<&mut T, Error> {
-    let value = match kept.take() {
-        Some(value) => value,
-        None => make()?,
-    };
-    Ok(kept.insert(value))
 }
 
 fn ms(since: Instant) -> f64 {

@@ -45,7 +45,7 @@ pub struct Viewer {
     pub about: String,
     /// The answer on screen.
     pub frame: Option<Frame>,
-    /// Errors against the exact effect are asked for with the next request.
+    /// Errors against the exact sum are asked for with the next request.
     pub measure: bool,
     /// Times of passes are asked for with the next request.
     pub time_passes: bool,
@@ -357,7 +357,7 @@ fn notches(event: &egui::Event) -> f32 {
 }
 
 /// The profile of skin, `scale` times as wide.
-fn scaled(scale: f32) -> Result<Profile, Error> {
+fn scaled(scale: f32) -> Result<Profile, subsurface::Error> {
     let gaussians = Profile::SKIN.gaussians().iter();
     let gaussians: Vec<_> = gaussians
         .map(|g| Gaussian {

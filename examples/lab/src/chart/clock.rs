@@ -1,5 +1,5 @@
-//! Timing: wall clock around submit-and-wait, methods one after the other in rounds, there and back,
-//! so that a drift of the machine hits all alike.
+//! Timing: methods one after the other in rounds, there and back, so that a drift of the machine hits all
+//! alike.
 
 use std::time::Instant;
 
@@ -7,7 +7,145 @@ use subsurface::wgpu::TextureView;
 
 use crate::Error;
 use crate::method::ScreenMethod;
-use crate::renderer::Gpu;
+use crate::renderer::{Gpu, Timestamps};
+
+/// On a GPU a method takes less than its submission; it is repeated within one until that lasts so long.
+const LONG_ENOUGH_MS: f64 = 20.0;
+/// What is faster than a millionth of that does nothing.
+const MOST_REPEATS: u32 = 1 << 20;
+
+/// How time is taken.
+pub struct Clock {
+    /// Of software drivers some report half of what passes of a chain take.
+    timestamps: Option<Timestamps>,
+    long_enough_ms: f64,
+}
+
+impl Clock {
+    pub fn new(gpu: &Gpu) -> Self {
+        match gpu.is_cpu {
+            true => Self {
+                timestamps: None,
+                long_enough_ms: 0.0,
+            },
+            false => Self {
+                timestamps: Timestamps::new(gpu, 2),
+                long_enough_ms: LONG_ENOUGH_MS,
+            },
+        }
+    }
+
+    /// For people.
+    pub fn name(&self) -> String {
+        let what = match self.timestamps {
+            Some(_) => "GPU timestamps",
+            None => "wall clock around submit and wait",
+        };
+        match self.long_enough_ms {
+            0.0 => format!("{what}, a method once a submission"),
+            ms => format!("{what}, a method repeated within a submission until that lasts {ms} ms"),
+        }
+    }
+
+    /// How often a method, prepared before, is to be repeated within a submission.
+    ///
+    /// # Errors
+    /// An output that the method refuses.
+    pub fn repeats(
+        &self,
+        gpu: &Gpu,
+        method: &dyn ScreenMethod,
+        output: &TextureView,
+    ) -> Result<u32, Error> {
+        let mut repeats = 1;
+        while self.long_enough_ms > 0.0
+            && repeats < MOST_REPEATS
+            && f64::from(repeats) * self.ms(gpu, method, output, repeats)? < self.long_enough_ms
+        {
+            repeats *= 2;
+        }
+        Ok(repeats)
+    }
+
+    /// Milliseconds of a method, the mean of so many within a submission.
+    ///
+    /// # Errors
+    /// An output that the method refuses.
+    pub fn ms(
+        &self,
+        gpu: &Gpu,
+        method: &dyn ScreenMethod,
+        output: &TextureView,
+        repeats: u32,
+    ) -> Result<f64, Error> {
+        let render =
+            |encoder: &mut _| (0..repeats).try_for_each(|_| method.render(encoder, output));
+        let ms = match &self.timestamps {
+            Some(timestamps) => {
+                let (rendered, times) = timestamps.run(gpu, |encoder| {
+                    timestamps.mark(encoder, 0);
+                    let rendered = render(encoder);
+                    timestamps.mark(encoder, 1);
+                    (rendered, 2)
+                });
+                rendered?;
+                times[1] - times[0]
+            }
+            None => {
+                let start = Instant::now();
+                gpu.run(render)?;
+                start.elapsed().as_secs_f64() * 1e3
+            }
+        };
+        Ok(ms / f64::from(repeats))
+    }
+}
+
+/// What a frame takes of a host's CPU.
+pub struct HostCost {
+    /// Checking and uploading, in µs.
+    pub prepare_us: f64,
+    /// Recording, until the commands are ready to be submitted, in µs.
+    pub render_us: f64,
+    /// Memory that the uploads of a frame are staged in, in bytes.
+    pub upload_bytes: isize,
+}
+
+/// The medians of `frames` frames like the one that a method was prepared for.
+///
+/// # Errors
+/// A frame or an output that the method refuses.
+pub fn host_cost(
+    gpu: &Gpu,
+    method: &mut dyn ScreenMethod,
+    frame: &subsurface::Frame,
+    output: &TextureView,
+    frames: usize,
+) -> Result<HostCost, Error> {
+    let (mut prepare, mut render, mut upload_bytes) = (Vec::new(), Vec::new(), 0);
+    let us = |since: Instant| since.elapsed().as_secs_f64() * 1e6;
+    for _ in 0..frames {
+        let staged = || gpu.device.get_internal_counters().hal.buffer_memory.read();
+        let before = staged();
+        let since = Instant::now();
+        method.prepare(&gpu.device, &gpu.queue, frame)?;
+        prepare.push(us(since));
+        upload_bytes = staged() - before;
+        let since = Instant::now();
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        method.render(&mut encoder, output)?;
+        let commands = encoder.finish();
+        render.push(us(since));
+        // What was staged goes; what was recorded is not drawn.
+        drop(commands);
+        gpu.run(|_| ());
+    }
+    Ok(HostCost {
+        prepare_us: median(&prepare),
+        render_us: median(&render),
+        upload_bytes,
+    })
+}
 
 /// Rounds that a method takes part in.
 #[derive(Clone, Copy)]
@@ -26,11 +164,16 @@ pub struct Rounds {
 /// An output that a method refuses.
 pub fn rounds(
     gpu: &Gpu,
+    clock: &Clock,
     methods: &[(&dyn ScreenMethod, &TextureView, bool)],
     rounds: Rounds,
     mut tick: impl FnMut(),
 ) -> Result<Vec<Vec<f64>>, Error> {
     let mut times = vec![Vec::new(); methods.len()];
+    let mut repeats = Vec::new();
+    for (method, output, _) in methods {
+        repeats.push(clock.repeats(gpu, *method, output)?);
+    }
     let mut since = Instant::now();
     for round in 0..rounds.compared.max(rounds.all) {
         if round == rounds.all {
@@ -47,9 +190,7 @@ pub fn rounds(
             };
             let (method, output, compared) = methods[i];
             if round < rounds.all || compared && round < rounds.compared {
-                let start = Instant::now();
-                gpu.run(|encoder| method.render(encoder, output))?;
-                times[i].push(start.elapsed().as_secs_f64() * 1e3);
+                times[i].push(clock.ms(gpu, method, output, repeats[i])?);
             }
         }
         tick();
@@ -94,7 +235,58 @@ pub fn ratio(times: &[f64], base: &[f64]) -> (f64, [f64; 2]) {
 
 #[cfg(test)]
 mod tests {
+    use subsurface::Frame;
+    use subsurface::wgpu::{
+        Buffer, BufferDescriptor, BufferUsages, CommandEncoder, Device, Features, Queue,
+        TextureFormat,
+    };
+
     use super::*;
+
+    /// Clears a buffer.
+    struct Clear(Buffer);
+
+    impl ScreenMethod for Clear {
+        fn prepare(&mut self, _: &Device, _: &Queue, _: &Frame) -> Result<(), Error> {
+            Ok(())
+        }
+
+        fn render(&self, encoder: &mut CommandEncoder, _: &TextureView) -> Result<(), Error> {
+            encoder.clear_buffer(&self.0, 0, None);
+            Ok(())
+        }
+
+        fn fetches(&self, _: f64) -> Option<f64> {
+            None
+        }
+
+        fn scratch_bytes_per_pixel(&self) -> f64 {
+            0.0
+        }
+    }
+
+    #[test]
+    fn what_is_short_is_repeated_until_it_is_long_enough() {
+        let gpu = Gpu::with(Features::TIMESTAMP_QUERY).unwrap();
+        let output = gpu.target("output", [1, 1], TextureFormat::Rgba16Float);
+        let clear = Clear(gpu.device.create_buffer(&BufferDescriptor {
+            label: None,
+            size: 1 << 20,
+            usage: BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        }));
+        for timestamps in [None, Timestamps::new(&gpu, 2)] {
+            let clock = Clock {
+                timestamps,
+                long_enough_ms: 5.0,
+            };
+            let repeats = clock.repeats(&gpu, &clear, &output).unwrap();
+            let ms = clock.ms(&gpu, &clear, &output, repeats).unwrap();
+            println!("{}: {repeats} times {ms} ms", clock.name());
+            // A megabyte is cleared in well under that, by a busy machine, too.
+            assert!(repeats > 1 && ms > 0.0 && ms < 5.0, "{repeats}, {ms}");
+        }
+    }
 
     #[test]
     fn medians_are_in_the_middle() {

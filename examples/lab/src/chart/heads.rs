@@ -5,6 +5,7 @@ use std::time::Instant;
 use crate::Error;
 use subsurface::wgpu::TextureView;
 
+use crate::chart::clock::{self, Clock};
 use crate::chart::options::Plan;
 use crate::chart::plot::Series;
 use crate::chart::scene::{Scene, Surface};
@@ -28,9 +29,11 @@ pub struct Textured<'a> {
 ///
 /// # Errors
 /// What the methods refuse.
+#[allow(clippy::too_many_arguments, reason = "each is a thing of its own")]
 pub fn figure(
     gpu: &Gpu,
     model: &Model,
+    clock: &Clock,
     mm_per_unit: f32,
     plan: &Plan,
     mut screen: Option<&mut dyn ScreenMethod>,
@@ -50,11 +53,8 @@ pub fn figure(
         let output = head.renderer.scattered_target(gpu);
         if let Some(screen) = &mut screen {
             screen.prepare(&gpu.device, &gpu.queue, &scene.frame())?;
-            let ms = median_ms(plan, || {
-                let start = Instant::now();
-                gpu.run(|encoder| screen.render(encoder, &output))?;
-                Ok(start.elapsed().as_secs_f64() * 1e3)
-            })?;
+            let repeats = clock.repeats(gpu, &**screen, &output)?;
+            let ms = median_ms(plan, || clock.ms(gpu, &**screen, &output, repeats))?;
             on_screen.push((heads as f64, 1e3 / ms));
         }
         for (t, points) in textured.iter_mut().zip(&mut in_texture) {
@@ -124,7 +124,7 @@ fn median_ms(plan: &Plan, mut run: impl FnMut() -> Result<f64, Error>) -> Result
     {
         times.push(run()?);
     }
-    Ok(crate::chart::clock::median(&times))
+    Ok(clock::median(&times))
 }
 
 /// Heads in rows and columns, across a frame of as many pixels as `size` has.

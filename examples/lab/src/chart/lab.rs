@@ -6,14 +6,14 @@ use crate::Error;
 use glam::Vec3;
 use image::RgbImage;
 use indicatif::{ProgressBar, ProgressStyle};
-use subsurface::wgpu::{TextureFormat, TextureView};
+use subsurface::wgpu::{Features, TextureFormat, TextureView};
 use subsurface::{Profile, TextureSpace};
 
-use crate::chart::clock;
+use crate::chart::clock::{self, Clock};
 use crate::chart::costs;
 use crate::chart::heads::{self, HEADS, Textured, time_atlas};
 use crate::chart::options::{Options, Plan};
-use crate::chart::progress::{Done, Interval, Visibility};
+use crate::chart::progress::{Done, Host, Interval, Visibility};
 use crate::chart::report::SceneImages;
 use crate::chart::row::Row;
 use crate::chart::scene::{Head, Scene, Surface, rgb};
@@ -42,17 +42,23 @@ pub const METHODS: [&str; 11] = [
 ];
 
 /// Methods that are compared by the ratio of their times, and so are timed more often.
-const COMPARED: [(&str, &str); 6] = [
+const COMPARED: [(&str, &str); 9] = [
     ("copy", ""),
     ("screen_exact", ""),
+    ("screen_planned", "1/50"),
     ("screen_planned", "1/100"),
     ("screen_planned", "1/255"),
+    ("jimenez_separable", "11"),
+    ("fitted_separable", "11"),
     ("jimenez_separable", "17"),
     ("fitted_separable", "17"),
 ];
 
 /// Errors that are asked for: one in so many.
-const PLANNED: [u16; 2] = [100, 255];
+const PLANNED: [u16; 3] = [50, 100, 255];
+
+/// Frames that the cost to a host's CPU is the median of.
+const HOST_FRAMES: usize = 31;
 
 /// Side of the pictures in the report, at most.
 const THUMBNAIL: u32 = 256;
@@ -60,6 +66,7 @@ const THUMBNAIL: u32 = 256;
 /// What stays the same from scene to scene.
 pub struct Lab<'a> {
     pub gpu: Gpu,
+    pub clock: Clock,
     pub plan: Plan,
     pub bar: ProgressBar,
     /// Of the skin profile, by the error that they keep.
@@ -72,7 +79,7 @@ impl<'a> Lab<'a> {
     /// # Errors
     /// No adapter; a size that it cannot render.
     pub fn new(model: Model, options: &'a Options) -> Result<Self, Error> {
-        let gpu = Gpu::headless()?;
+        let gpu = Gpu::with(Features::TIMESTAMP_QUERY)?;
         let plan = Plan::new(options);
         gpu.check_size(plan.size)?;
         let style = ProgressStyle::with_template("{bar:24} {msg}");
@@ -83,6 +90,7 @@ impl<'a> Lab<'a> {
             plans.push((format!("1/{steps}"), plan));
         }
         Ok(Self {
+            clock: Clock::new(&gpu),
             gpu,
             plan,
             bar,
@@ -111,9 +119,18 @@ impl<'a> Lab<'a> {
     /// A scene that cannot be drawn; a cache that cannot be written.
     pub fn scene(&self, name: &str) -> Result<Done, Error> {
         let Self { gpu, model, .. } = self;
-        let Plan { size, stride, .. } = self.plan;
+        let Plan {
+            size, wide, stride, ..
+        } = self.plan;
         self.begin(format!("{name}: drawing"), 1);
-        let scene = Scene::new(gpu, model, self.options.mm_per_unit, name, size, stride)?;
+        let scene = Scene::new(
+            gpu,
+            model,
+            self.options.mm_per_unit,
+            name,
+            [size, wide],
+            stride,
+        )?;
         let cache = &self.options.cache;
         let truths = Truths::of(gpu, model, &scene, &Profile::SKIN, cache, &self.bar)?;
         let score = Score::new(&scene, &truths, read(gpu, &scene, &scene.irradiance));
@@ -172,7 +189,21 @@ impl<'a> Lab<'a> {
             .collect();
         let rounds = self.plan.rounds;
         self.begin(format!("{}: timing", scene.name), rounds.compared);
-        let times = clock::rounds(gpu, &timed, rounds, || self.bar.inc(1))?;
+        let times = clock::rounds(gpu, &self.clock, &timed, rounds, || self.bar.inc(1))?;
+        for (name, setting, method) in &mut methods {
+            if !name.starts_with("screen_") {
+                continue;
+            }
+            let cost = clock::host_cost(gpu, &mut **method, &frame, &output, HOST_FRAMES)?;
+            done.host.push(Host {
+                scene: scene.name.clone(),
+                method: name.to_string(),
+                setting: setting.clone(),
+                prepare_us: cost.prepare_us,
+                render_us: cost.render_us,
+                upload_bytes: cost.upload_bytes,
+            });
+        }
 
         if self.wanted("none") {
             let mut row = empty_row(scene, "none", "");
@@ -317,7 +348,7 @@ impl<'a> Lab<'a> {
             timed.extend(of_scene.iter().map(|(.., m)| (m.as_ref(), output, true)));
         }
         self.begin("costs: timing".into(), rounds.compared);
-        let times = clock::rounds(gpu, &timed, rounds, || self.bar.inc(1))?;
+        let times = clock::rounds(gpu, &self.clock, &timed, rounds, || self.bar.inc(1))?;
         let count = methods[0].len();
         let mut done = Done::default();
         for (s, scene) in scenes.iter().enumerate() {
@@ -378,6 +409,7 @@ impl<'a> Lab<'a> {
         let (heads, notes) = heads::figure(
             &self.gpu,
             &self.model,
+            &self.clock,
             self.options.mm_per_unit,
             &self.plan,
             self.wanted("screen_exact").then_some(screen),

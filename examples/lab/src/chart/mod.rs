@@ -34,7 +34,7 @@ use files::Chart;
 use lab::{Lab, METHODS};
 use options::{Options, Plan};
 use plot::Series;
-use progress::{Interval, Progress, Visibility};
+use progress::{Host, Interval, Progress, Visibility};
 use report::SceneImages;
 use row::Row;
 
@@ -117,7 +117,9 @@ fn chart(options: &Options) -> Result<(), Error> {
     let heads: Vec<Series> = done.iter().flat_map(|d| d.heads.clone()).collect();
     let intervals: Vec<&Interval> = done.iter().flat_map(|d| &d.intervals).collect();
     let visibility: Vec<&Visibility> = done.iter().flat_map(|d| &d.visibility).collect();
+    let host: Vec<&Host> = done.iter().flat_map(|d| &d.host).collect();
     let mut notes = notes(&lab.plan);
+    notes.extend(host_note(&host));
     notes.extend(done.iter().flat_map(|d| d.notes.clone()));
     let command: Vec<String> = std::env::args().skip(1).collect();
     let command = match command.as_slice() {
@@ -128,8 +130,13 @@ fn chart(options: &Options) -> Result<(), Error> {
         ),
     };
     let [width, height] = lab.plan.size;
+    let commit = commit();
+    let clock = lab.clock.name();
     let about = json!({
         "adapter": lab.gpu.adapter,
+        "clock": clock,
+        "commit": commit,
+        "host": host,
         "model": model_name,
         "size": format!("{width}x{height}"),
         "command": command,
@@ -141,7 +148,7 @@ fn chart(options: &Options) -> Result<(), Error> {
         rows: &rows,
         about: &about,
         caption: &format!(
-            "{}, {width}×{height}, {model_name}\n`{command}`",
+            "{}, {width}×{height}, {model_name}\n{clock}, commit {commit}\n`{command}`",
             lab.gpu.adapter
         ),
         heads: &heads,
@@ -182,8 +189,8 @@ fn notes(plan: &Plan) -> Vec<String> {
     vec![
         "Errors are of irradiance/π over skin, a rim of one pixel left out.".into(),
         format!(
-            "Truths are summed at one pixel in {stride} each way, one in {} on edges from 8 px on; errors, ΔE2000 \
-             and FLIP are of these pixels, so that FLIP sees a picture that much smaller.",
+            "Truths are summed at one pixel in {stride} each way, one in {} of wide frames and on edges from 8 px \
+             on; errors, ΔE2000 and FLIP are of these pixels, so that FLIP sees a picture that much smaller.",
             scene::SPARSE * stride
         ),
         "Screen-space methods are compared with the visible integral, in colour differences and energy, \
@@ -195,11 +202,52 @@ fn notes(plan: &Plan) -> Vec<String> {
          fitted; all fits minimise the worst error on a step edge. jimenez_2009 has its authors' own fit.".into(),
         "Rivals keep half floats between passes, as published, screen_exact and texture_separable full \
          ones; a software driver that truncates half floats costs the former up to .001 relative.".into(),
-        "Texture-space times hold the drawing and lighting of the atlas, which screen space has from the \
-         frame; they are not interleaved with the others. texture_2d is run at one atlas and one view.".into(),
-        "Times are wall clock around submit and wait; GPU timestamps are not taken, since the software \
-         driver reports half of them.".into(),
+        "Texture-space times are wall clock and hold the drawing and lighting of the atlas, which screen \
+         space has from the frame; they are not interleaved with the others. texture_2d is run at one atlas and one view.".into(),
+        "Rivals draw over skin alone, by a stencil that their first pass marks, and keep the light as it was \
+         elsewhere; ours find their tiles of skin themselves. All of that is in the times.".into(),
     ]
+}
+
+/// What was measured: the commit, and whether the tree was changed since.
+fn commit() -> String {
+    let git = std::process::Command::new("git")
+        .args([
+            "describe",
+            "--always",
+            "--dirty",
+            "--abbrev=12",
+            "--exclude=*",
+        ])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output();
+    let text = git.ok().filter(|git| git.status.success());
+    text.and_then(|git| String::from_utf8(git.stdout).ok())
+        .map_or("unknown".into(), |text| text.trim().to_owned())
+}
+
+/// What a host's CPU spends on a frame, over all scenes.
+fn host_note(host: &[&Host]) -> Option<String> {
+    let names: Vec<String> = host
+        .iter()
+        .map(|h| format!("{} {}", h.method, h.setting))
+        .collect();
+    let of_method = |name: &str| {
+        let of = |value: fn(&Host) -> f64| {
+            let mine = names.iter().zip(host).filter(|(n, _)| *n == name);
+            clock::median(&mine.map(|(_, h)| value(h)).collect::<Vec<_>>())
+        };
+        format!(
+            "{} prepares in {:.0} µs, staging {} bytes, and records in {:.0} µs",
+            name.trim_end(),
+            of(|h| h.prepare_us),
+            of(|h| h.upload_bytes as f64),
+            of(|h| h.render_us),
+        )
+    };
+    let methods = plot::style::distinct(names.iter().map(String::as_str));
+    let parts: Vec<String> = methods.into_iter().map(of_method).collect();
+    (!parts.is_empty()).then(|| format!("CPU time of a host, a frame: {}.", parts.join("; ")))
 }
 
 fn table(rows: &[Row]) -> String {

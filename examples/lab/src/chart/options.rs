@@ -12,10 +12,11 @@ against the other.
 
 Usage: cargo run --release --example chart -- [OPTIONS]
 
-  --scenes LIST     of front, three-quarter, close-up, far, profile, sphere, edge_0.5 to edge_64,
-                    costs and heads, separated by commas                [all]
+  --scenes LIST     of front, three-quarter, close-up, far, profile, wide, sphere, edge_0.5 to
+                    edge_64, costs and heads, separated by commas       [all]
   --methods LIST    such as screen_exact,burley_disk                    [all]
-  --size WxH        of the frames, in pixels                            [512x512; quick: 256x256]
+  --size WxH        of the frames, in pixels, but for wide, a third of   [512x512; quick: 256x256]
+                    which is skin: 1920x1080; quick: 960x540
   --quick           fewer runs, smaller atlases, truths at every fourth pixel, not every second
   --model FILE      a .glb or .gltf file                                [the built-in head]
   --mm-per-unit X   length of the model's unit in mm                    [1000: metres]
@@ -106,6 +107,8 @@ fn size(text: &str) -> Result<[u32; 2], Error> {
 /// What `--quick` cuts, and nothing else does.
 pub struct Plan {
     pub size: [u32; 2],
+    /// Of the frame as games have it.
+    pub wide: [u32; 2],
     pub rounds: Rounds,
     /// The truth is asked for at every so many pixels, each way.
     pub stride: u32,
@@ -126,6 +129,7 @@ impl Plan {
         if options.quick {
             return Self {
                 size: size(256),
+                wide: [960, 540],
                 rounds: Rounds {
                     all: 3,
                     compared: 3,
@@ -141,6 +145,7 @@ impl Plan {
         }
         Self {
             size: size(512),
+            wide: [1920, 1080],
             rounds: Rounds {
                 all: 9,
                 compared: 31,

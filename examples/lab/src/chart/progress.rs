@@ -19,6 +19,7 @@ use crate::output;
 pub struct Done {
     pub rows: Vec<Row>,
     pub intervals: Vec<Interval>,
+    pub host: Vec<Host>,
     pub heads: Vec<Series>,
     pub notes: Vec<String>,
     pub visibility: Vec<Visibility>,
@@ -43,6 +44,20 @@ pub struct Interval {
     pub runs: usize,
     /// Bootstrap, of the median ratio.
     pub interval_95: [f64; 2],
+}
+
+/// What a frame of one of our effects takes of a host's CPU.
+#[derive(Deserialize, Serialize)]
+pub struct Host {
+    pub scene: String,
+    pub method: String,
+    pub setting: String,
+    /// Checking and uploading.
+    pub prepare_us: f64,
+    /// Recording, until the commands are ready to be submitted.
+    pub render_us: f64,
+    /// Memory that uploads are staged in.
+    pub upload_bytes: isize,
 }
 
 /// [`SceneImages`] as PNG in base64.

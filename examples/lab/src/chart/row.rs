@@ -19,7 +19,7 @@ pub struct Row {
     pub skin_pixels: usize,
     /// Pixels a millimetre, where the surface faces the camera.
     pub px_per_mm: f64,
-    /// Median wall time from submitting to done; 0 for no scattering, which does nothing.
+    /// Median time, by the clock that the chart names; 0 for no scattering, which does nothing.
     pub ms: f64,
     /// The same as a multiple of the plain copy, median of the ratios within a round.
     pub x_copy: f64,

@@ -6,7 +6,9 @@ use half::f16;
 use subsurface::wgpu::{TextureFormat, TextureView};
 use subsurface::{Frame, Profile};
 
-use crate::renderer::{Camera, Gpu, Lighting, Primitive, Probe, Renderer, Scene as Model, View};
+use crate::renderer::{
+    Camera, Gpu, Lighting, Primitive, Probe, Renderer, Scene as Model, View, Visible,
+};
 use crate::truth::{Patch, Pixel, closed_form};
 
 /// σ of red light in the skin profile, in mm, by which the edges are named.
@@ -26,6 +28,7 @@ pub fn names() -> Vec<String> {
         "close-up",
         "far",
         "profile",
+        "wide",
         "sphere",
     ];
     let edges = EDGES_PX.iter().map(|px| format!("edge_{px}"));
@@ -67,7 +70,8 @@ pub struct Head {
 }
 
 impl Scene {
-    /// The scene of this name; the truth is asked for at every `stride` pixels, or fewer.
+    /// The scene of this name, which `wide` is of another size than the others; the truth is asked for at
+    /// every `stride` pixels, or fewer.
     ///
     /// # Errors
     /// A name that is none, or a size that the device cannot render.
@@ -76,9 +80,15 @@ impl Scene {
         model: &Model,
         mm_per_unit: f32,
         name: &str,
-        size: [u32; 2],
+        [size, wide]: [[u32; 2]; 2],
         stride: u32,
     ) -> Result<Self, Error> {
+        if name == "wide" {
+            let camera = a_third(gpu, model, mm_per_unit, wide)?;
+            let scene = Self::head(gpu, model, mm_per_unit, name, wide, camera)?;
+            let stride = SPARSE * stride;
+            return Ok(Self { stride, ..scene });
+        }
         let view = |view| Camera::framing(model, view, size);
         let camera = match name {
             "front" => view(View::Front),
@@ -123,22 +133,18 @@ impl Scene {
             .map(|id| *id == 1)
             .collect();
         let irradiance = gpu.read(&g.irradiance);
-        let view = camera.view();
-        let mm_per_px = 2.0 * (camera.fov_y / 2.0).tan() / size[1] as f32;
         if !skin.contains(&true) {
             return Err(Error::new(name, "no skin in view", "a model that scatters"));
         }
         let pixels = (0..skin.len()).filter(|i| skin[*i]).map(|i| {
-            let [x, y, z, area_mm2] = visible[i];
-            let point_mm = Vec3::new(x, y, z);
-            let depth_mm = -view.transform_point3(point_mm / mm_per_unit).z * mm_per_unit;
+            let Visible { point_mm, steps_mm } = visible[i];
             Pixel {
                 patch: Patch {
                     point_mm,
-                    area_mm2,
+                    area_mm2: steps_mm[0].cross(steps_mm[1]).length(),
                     irradiance: rgb(irradiance[i]),
                 },
-                facing_mm2: (depth_mm * mm_per_px).powi(2),
+                steps_mm,
             }
         });
         Ok(Self {
@@ -189,6 +195,21 @@ pub fn rgb([r, g, b, _]: [f32; 4]) -> Vec3 {
 pub fn vertices_mm(primitive: &Primitive, mm_per_unit: f32) -> impl Iterator<Item = Vec3> {
     let positions = primitive.vertices.iter().map(|v| Vec3::from(v.position));
     positions.map(move |p| p * mm_per_unit)
+}
+
+/// The view from the front, narrowed or widened until a third of the frame is skin.
+fn a_third(gpu: &Gpu, model: &Model, mm_per_unit: f32, size: [u32; 2]) -> Result<Camera, Error> {
+    const TRIES: usize = 4;
+    // Of what part is skin, few pixels tell enough.
+    let small = size.map(|s| (s / 8).max(1));
+    let mut camera = Camera::framing(model, View::Front, size);
+    for _ in 0..TRIES {
+        let scene = Scene::head(gpu, model, mm_per_unit, "wide", small, camera)?;
+        let share = scene.pixels.len() as f32 / scene.skin.len() as f32;
+        let half = (camera.fov_y / 2.0).tan() * (3.0 * share).sqrt();
+        camera.fov_y = 2.0 * half.atan();
+    }
+    Ok(camera)
 }
 
 /// From so far away that a pixel is a third of a centimetre.
@@ -301,14 +322,19 @@ fn orthographic(
             id.push(u8::from(found.is_some()));
             skin.push(found.is_some());
             if let Some(h) = found {
-                let facing_mm2 = px_per_mm.powi(-2);
+                // On the tangent plane, down being −y in mm.
+                let step = |x: f64, y: f64| {
+                    let z = -(x * h.normal.x + y * h.normal.y) / h.normal.z;
+                    DVec3::new(x, y, z) / px_per_mm
+                };
+                let steps = [step(1.0, 0.0), step(0.0, -1.0)];
                 pixels.push(Pixel {
                     patch: Patch {
                         point_mm: h.point_mm.as_vec3(),
-                        area_mm2: (facing_mm2 / h.normal.z) as f32,
+                        area_mm2: steps[0].cross(steps[1]).length() as f32,
                         irradiance: Vec3::splat(f16::from_bits(bits[0]).to_f32()),
                     },
-                    facing_mm2: facing_mm2 as f32,
+                    steps_mm: steps.map(|step| step.as_vec3()),
                 });
                 known.push(h.scattered.as_vec3());
             }

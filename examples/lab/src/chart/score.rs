@@ -119,15 +119,7 @@ impl<'a> Score<'a> {
         let lit = self.lit(&shown);
         RgbImage::from_fn(lit.width, lit.height, |x, y| {
             let pixel = lit.pixels[(y * lit.width + x) as usize];
-            Rgb(pixel.map(|c| {
-                // IEC 61966-2-1; a float-to-byte cast saturates.
-                let encoded = if c <= 0.0031308 {
-                    12.92 * c
-                } else {
-                    1.055 * c.powf(1.0 / 2.4) - 0.055
-                };
-                (255.0 * encoded).round() as u8
-            }))
+            Rgb(pixel.map(crate::srgb::encode))
         })
     }
 

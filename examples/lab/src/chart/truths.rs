@@ -147,7 +147,7 @@ impl Truths {
 }
 
 /// Eq. 7 over all of a model's skin, by the renderer's own lights.
-#[allow(clippy::too_many_arguments)] // Each is a thing of its own.
+#[allow(clippy::too_many_arguments, reason = "each is a thing of its own")]
 pub fn eq7(
     gpu: &Gpu,
     model: &Model,
@@ -225,7 +225,9 @@ fn key(model: &Model, scene: &Scene, profile: &Profile) -> u64 {
             area_mm2,
             irradiance,
         } = p.patch;
-        for v in [point_mm, irradiance, Vec3::new(area_mm2, p.facing_mm2, 0.0)] {
+        area_mm2.to_bits().hash(&mut hasher);
+        let [x, y] = p.steps_mm;
+        for v in [point_mm, irradiance, x, y] {
             v.to_array().map(f32::to_bits).hash(&mut hasher);
         }
     }
@@ -246,7 +248,7 @@ mod tests {
         let gpu = Gpu::headless().unwrap();
         let model = Model::from_glb(crate::HEAD).unwrap();
         for view in ["front", "close-up"] {
-            let scene = Scene::new(&gpu, &model, 1000.0, view, [64, 64], 1).unwrap();
+            let scene = Scene::new(&gpu, &model, 1000.0, view, [[64; 2]; 2], 1).unwrap();
             let Surface::Head(head) = &scene.surface else {
                 panic!("a view of the head has a head");
             };
@@ -288,7 +290,7 @@ mod tests {
         let gpu = Gpu::headless().unwrap();
         let model = Model::from_glb(crate::HEAD).unwrap();
         let cache = std::env::temp_dir().join(format!("truths-{}", std::process::id()));
-        let scene = |name| Scene::new(&gpu, &model, 1000.0, name, [32, 32], 1).unwrap();
+        let scene = |name| Scene::new(&gpu, &model, 1000.0, name, [[32; 2]; 2], 1).unwrap();
         let bar = ProgressBar::hidden();
         let truths =
             |scene: &Scene| Truths::of(&gpu, &model, scene, &Profile::SKIN, &cache, &bar).unwrap();

@@ -1,5 +1,5 @@
-//! Renders a head three ways — no scattering, texture space, screen space — measures how far
-//! they are apart, and writes pictures, layers and a report.
+//! Renders a head four ways — no scattering, texture space, screen space by a plan and by the exact sum —
+//! measures how far they are apart, and writes pictures, layers and a report.
 //!
 //! ```sh
 //! cargo run --release --example compare
@@ -15,15 +15,14 @@ use crate::Error;
 use glam::{Mat4, Vec3, Vec4};
 use image::RgbImage;
 use indicatif::{ProgressBar, ProgressStyle};
-use subsurface::{DEFAULT_MAX_ERROR, Plan, Profile, TextureSpace, wgpu};
+use subsurface::{Atlas, DEFAULT_MAX_ERROR, Plan, Profile, TextureSpace, wgpu};
 
 use crate::method::{self, Ours};
-
 use crate::metrics::{self, Layer};
-use crate::output;
 use crate::renderer::{
     AtlasRenderer, Camera, Gpu, Layer as Shown, Lighting, Renderer, Scene, Specular, View,
 };
+use crate::{output, srgb};
 use report::{DIFFERENCE_GAIN, ModeReport, Report};
 
 /// Runs that a median is taken of: this many, or as many as fit into this time.
@@ -34,7 +33,7 @@ const TIMED_SECONDS: f64 = 10.0;
 const RESOLVED_TEXELS: f32 = 0.6;
 
 const HELP: &str = "\
-Renders a head without scattering, scattered in texture space and scattered in screen space.
+Renders a head without scattering, in texture space, and in screen space by a plan and by the exact sum.
 
 Usage: cargo run --release --example compare -- [OPTIONS]
 
@@ -47,6 +46,7 @@ Usage: cargo run --release --example compare -- [OPTIONS]
   --skin NAME,…       materials, meshes or nodes that are skin    [by their names]
   --not-skin NAME,…   materials, meshes or nodes that are not     [by their names]
   --profile FILE      a diffusion profile in JSON                 [skin, six Gaussians]
+  --max-error X       largest error of the plan, of white         [1/255]
   --mm-per-unit X     length of a scene unit in mm                [1000: metres]
   --specular FORM     kelemen or li-shao                          [kelemen]
   --texture-size N    of the atlas, in texels                     [2048]
@@ -65,6 +65,7 @@ struct Options {
     /// Names of what is skin, and of what is not.
     skin: [Vec<String>; 2],
     profile: Profile,
+    max_error: f32,
     mm_per_unit: f32,
     specular: Specular,
     texture_size: u32,
@@ -96,6 +97,7 @@ fn options() -> Result<Option<Options>, Error> {
         turn_degrees: 0.0,
         skin: Default::default(),
         profile: Profile::SKIN,
+        max_error: DEFAULT_MAX_ERROR,
         mm_per_unit: 1000.0,
         specular: Specular::Kelemen,
         texture_size: 2048,
@@ -141,6 +143,7 @@ fn options() -> Result<Option<Options>, Error> {
             "not-skin" => options.skin[1] = names(&text()?),
             "profile" => options.profile = profile(&text()?)?,
             "specular" => options.specular = text()?.parse()?,
+            "max-error" => options.max_error = max_error(&text()?)?,
             "mm-per-unit" => options.mm_per_unit = positive("--mm-per-unit", &text()?)?,
             "exposure" => options.exposure = positive("--exposure", &text()?)?,
             "texture-size" => {
@@ -188,6 +191,17 @@ fn positive(input: &str, text: &str) -> Result<f32, Error> {
     positive.ok_or_else(|| Error::new(input, text, "a number above 0"))
 }
 
+/// A number, or a fraction such as 1/255.
+fn max_error(text: &str) -> Result<f32, Error> {
+    let number = |text: &str| text.trim().parse::<f32>().ok();
+    match text.split_once('/') {
+        Some((parts, whole)) => number(parts).zip(number(whole)).map(|(p, w)| p / w),
+        None => number(text),
+    }
+    .filter(|x| x.is_finite() && *x > 0.0)
+    .ok_or_else(|| Error::new("--max-error", text, "a number above 0, such as 1/255"))
+}
+
 fn profile(path: &str) -> Result<Profile, Error> {
     let text = std::fs::read_to_string(path)
         .map_err(|e| Error::new(path, format!("\"{e}\""), "a file that can be read"))?;
@@ -197,7 +211,7 @@ fn profile(path: &str) -> Result<Profile, Error> {
 /// A mode's scattered irradiance on the device, and what it cost.
 struct Scattered {
     name: &'static str,
-    title: &'static str,
+    title: String,
     view: wgpu::TextureView,
     runs: usize,
     /// Median over the runs.
@@ -206,9 +220,19 @@ struct Scattered {
     atlas_ms: Option<[f64; 2]>,
 }
 
+/// The scene, drawn and lit at one size, and scattered by every mode that can be had.
+struct Shot {
+    size: [u32; 2],
+    renderer: Renderer,
+    camera: Camera,
+    modes: Vec<Scattered>,
+    /// Modes that cannot be had: title and reason.
+    unavailable: Vec<(String, String)>,
+}
+
 fn compare(options: &Options) -> Result<(), Error> {
     let started = Instant::now();
-    let progress = ProgressBar::new(6).with_style(
+    let progress = ProgressBar::new(5).with_style(
         ProgressStyle::with_template("{bar:24} {msg}").expect("the template is a constant"),
     );
     let step = |message: &str| {
@@ -224,56 +248,29 @@ fn compare(options: &Options) -> Result<(), Error> {
     scene.choose(&options.skin[0], true, "--skin")?;
     scene.choose(&options.skin[1], false, "--not-skin")?;
     let gpu = Gpu::headless()?;
-    let renderer = Renderer::new(&gpu, &scene, options.size)?;
 
-    step("drawing and lighting");
-    let distance = options.distance_mm / options.mm_per_unit;
-    let camera = match options.look_at {
-        Some(point) => Camera::looking_at(&scene, options.view, point, distance),
-        None => Camera::framing(&scene, options.view, options.size),
-    }
-    .turned(options.turn_degrees.to_radians());
-    let lighting = Lighting {
-        specular: options.specular,
-        ..Default::default()
+    step("scattering");
+    let shot = Shot::new(&gpu, &scene, options, options.size, TIMED_RUNS)?;
+
+    // What is measured is of pixels that have one sample each, as methods take them.
+    step("scattering at twice the size, for smooth pictures");
+    let twice = options.size.map(|s| s.saturating_mul(2));
+    let fine = match gpu.check_size(twice) {
+        Ok(()) => Some(Shot::new(&gpu, &scene, options, twice, 1)?),
+        Err(_) => None,
     };
-    renderer.render(&gpu, &camera, &lighting, options.mm_per_unit)?;
-
-    step("scattering in screen space");
-    let none = Scattered {
-        name: "none",
-        title: "no scattering",
-        view: renderer.gbuffer.irradiance.clone(),
-        runs: 0,
-        ms: 0.0,
-        atlas_ms: None,
-    };
-    let plan = Plan::new(&[options.profile], DEFAULT_MAX_ERROR)?;
-    let exact = Plan::exact(&[options.profile])?;
-    let by = |mode, plan| scatter_screen(&gpu, &renderer, &camera, options, mode, plan);
-    let planned = by(("screen_planned", "screen space, a plan at 1/255"), &plan)?;
-    let exact = by(("screen_space", "screen space, exact"), &exact)?;
-
-    step("scattering in texture space");
-    let mut unavailable = Vec::new();
-    let mut modes = vec![none];
-    let atlas = AtlasRenderer::new(&gpu, &renderer, options.texture_size)?;
-    match scatter_texture(&gpu, &renderer, atlas, options) {
-        Ok(texture) => modes.push(texture),
-        Err(error) => unavailable.push(("texture space", error.to_string())),
-    }
-    modes.extend([planned, exact]);
 
     step("measuring");
-    let frame = Skin::read(&gpu, &renderer, &camera, options);
+    let frame = Skin::read(&gpu, &shot);
     let mm_per_texel = mm_per_texel(&scene, options);
     let finest = mm_per_texel
         .iter()
         .map(|(_, mm)| *mm)
         .fold(f32::INFINITY, f32::min);
     let coarsest = mm_per_texel.iter().map(|(_, mm)| *mm).fold(0.0, f32::max);
-    let measured = measure(&gpu, &renderer, &frame, &modes, options);
-    let runs: Vec<_> = modes
+    let measured = measure(&gpu, &shot, fine.as_ref(), &frame, options.exposure);
+    let runs: Vec<_> = shot
+        .modes
         .iter()
         .filter(|m| m.runs > 0)
         .map(|m| format!("{} of {}", m.title, m.runs))
@@ -283,6 +280,11 @@ fn compare(options: &Options) -> Result<(), Error> {
          the modes with each other, not with a GPU.",
         runs.join(", ")
     )];
+    if fine.is_none() {
+        notes.push(
+            "Pictures of this size are not anti-aliased: the device cannot render twice it.".into(),
+        );
+    }
     if finest < coarsest {
         notes.push(format!(
             "The primitives differ: {finest:.3} to {coarsest:.3} mm a texel; the coarsest is given."
@@ -299,9 +301,10 @@ fn compare(options: &Options) -> Result<(), Error> {
             .then(|| "MakeHuman base mesh and targets, CC0 1.0".into()),
         view: options.view_name.clone(),
         skin_pixels: frame.skin.iter().filter(|skin| **skin).count(),
-        mm_per_px: f64::from(options.mm_per_unit / camera.px_per_unit(options.size)),
+        mm_per_px: f64::from(options.mm_per_unit / shot.camera.px_per_unit(options.size)),
         mm_per_texel: coarsest.into(),
         texture_size: options.texture_size,
+        max_error: options.max_error,
         unresolved: unresolved(&mm_per_texel, &options.profile),
         notes,
         command: std::iter::once("compare".to_owned())
@@ -309,7 +312,7 @@ fn compare(options: &Options) -> Result<(), Error> {
             .collect::<Vec<_>>()
             .join(" "),
         modes: measured.reports,
-        unavailable,
+        unavailable: shot.unavailable,
     };
 
     step("writing the report");
@@ -332,78 +335,143 @@ fn compare(options: &Options) -> Result<(), Error> {
     Ok(())
 }
 
-fn scatter_screen(
-    gpu: &Gpu,
-    renderer: &Renderer,
-    camera: &Camera,
-    options: &Options,
-    (name, title): (&'static str, &'static str),
-    plan: &Plan,
-) -> Result<Scattered, Error> {
-    let output = renderer.scattered_target(gpu);
-    let projection = camera.projection(options.size);
-    let frame = renderer.gbuffer.frame(projection, options.mm_per_unit);
-    let mut ours = Ours::new(&gpu.device, output.texture().format(), plan)?;
-    let mut times = Vec::new();
-    let timed = Instant::now();
-    while more_runs(times.len(), timed) {
-        let start = Instant::now();
-        method::scatter(gpu, &mut ours, &frame, &output)?;
-        times.push(start.elapsed().as_secs_f64() * 1e3);
-    }
-    Ok(Scattered {
-        name,
-        title,
-        view: output,
-        runs: times.len(),
-        ms: median(&mut times),
-        atlas_ms: None,
-    })
-}
-
-/// Fails only where the model has no UVs for it.
-fn scatter_texture(
-    gpu: &Gpu,
-    renderer: &Renderer,
-    atlas: AtlasRenderer,
-    options: &Options,
-) -> Result<Scattered, Error> {
-    let output = renderer.scattered_target(gpu);
-    let format = output.texture().format();
-    let mut effect = TextureSpace::new(&gpu.device, format, &[options.profile])?;
-    let (mut raster, mut blur, mut both) = (Vec::new(), Vec::new(), Vec::new());
-    let timed = Instant::now();
-    while more_runs(both.len(), timed) {
-        let mut blur_ms = 0.0;
-        let raster_ms = atlas.render(
-            gpu,
+impl Shot {
+    fn new(
+        gpu: &Gpu,
+        scene: &Scene,
+        options: &Options,
+        size: [u32; 2],
+        most_runs: usize,
+    ) -> Result<Self, Error> {
+        let renderer = Renderer::new(gpu, scene, size)?;
+        let distance = options.distance_mm / options.mm_per_unit;
+        let camera = match options.look_at {
+            Some(point) => Camera::looking_at(scene, options.view, point, distance),
+            None => Camera::framing(scene, options.view, size),
+        }
+        .turned(options.turn_degrees.to_radians());
+        let lighting = Lighting {
+            specular: options.specular,
+            ..Default::default()
+        };
+        renderer.render(gpu, &camera, &lighting, options.mm_per_unit)?;
+        let none = Scattered {
+            name: "none",
+            title: "no scattering".into(),
+            view: renderer.gbuffer.irradiance.clone(),
+            runs: 0,
+            ms: 0.0,
+            atlas_ms: None,
+        };
+        let mut shot = Self {
+            size,
             renderer,
-            1,
-            options.mm_per_unit,
-            &output,
-            |atlas, to| {
+            camera,
+            modes: vec![none],
+            unavailable: Vec::new(),
+        };
+        match shot.texture_space(gpu, options, most_runs) {
+            Ok(mode) => shot.modes.push(mode),
+            Err(error) => shot
+                .unavailable
+                .push(("texture space".into(), error.to_string())),
+        }
+        let title = format!("screen space, a plan at {}", fraction(options.max_error));
+        match Plan::new(&[options.profile], options.max_error) {
+            Ok(plan) => {
+                let mode =
+                    shot.screen_space(gpu, options, "screen_planned", title, &plan, most_runs)?;
+                shot.modes.push(mode);
+            }
+            Err(error) => shot.unavailable.push((title, error.to_string())),
+        }
+        let exact = Plan::exact(&[options.profile])?;
+        let title = "screen space, the exact sum".into();
+        let mode = shot.screen_space(gpu, options, "screen_space", title, &exact, most_runs)?;
+        shot.modes.push(mode);
+        Ok(shot)
+    }
+
+    fn screen_space(
+        &self,
+        gpu: &Gpu,
+        options: &Options,
+        name: &'static str,
+        title: String,
+        plan: &Plan,
+        most_runs: usize,
+    ) -> Result<Scattered, Error> {
+        let output = self.renderer.scattered_target(gpu);
+        let projection = self.camera.projection(self.size);
+        let frame = self.renderer.gbuffer.frame(projection, options.mm_per_unit);
+        let mut ours = Ours::new(&gpu.device, output.texture().format(), plan)?;
+        let mut times = Vec::new();
+        let timed = Instant::now();
+        while more_runs(times.len(), most_runs, timed) {
+            let start = Instant::now();
+            method::scatter(gpu, &mut ours, &frame, &output)?;
+            times.push(start.elapsed().as_secs_f64() * 1e3);
+        }
+        Ok(Scattered {
+            name,
+            title,
+            view: output,
+            runs: times.len(),
+            ms: median(&mut times),
+            atlas_ms: None,
+        })
+    }
+
+    /// Fails only where the model has no UVs for it.
+    fn texture_space(
+        &self,
+        gpu: &Gpu,
+        options: &Options,
+        most_runs: usize,
+    ) -> Result<Scattered, Error> {
+        let renderer = &self.renderer;
+        let atlas = AtlasRenderer::new(gpu, renderer, options.texture_size)?;
+        let output = renderer.scattered_target(gpu);
+        let format = output.texture().format();
+        let mut effect = TextureSpace::new(&gpu.device, format, &[options.profile])?;
+        let (mut raster, mut blur, mut both) = (Vec::new(), Vec::new(), Vec::new());
+        let timed = Instant::now();
+        while more_runs(both.len(), most_runs, timed) {
+            let mut blur_ms = 0.0;
+            let scatter = |atlas: &Atlas, to: &wgpu::TextureView| {
                 let start = Instant::now();
                 method::scatter_atlas(gpu, &mut effect, atlas, to)?;
                 blur_ms += start.elapsed().as_secs_f64() * 1e3;
                 Ok(())
-            },
-        )?;
-        raster.push(raster_ms);
-        blur.push(blur_ms);
-        both.push(raster_ms + blur_ms);
+            };
+            let raster_ms =
+                atlas.render(gpu, renderer, 1, options.mm_per_unit, &output, scatter)?;
+            raster.push(raster_ms);
+            blur.push(blur_ms);
+            both.push(raster_ms + blur_ms);
+        }
+        Ok(Scattered {
+            name: "texture_space",
+            title: "texture space".into(),
+            view: output,
+            runs: both.len(),
+            ms: median(&mut both),
+            atlas_ms: Some([median(&mut raster), median(&mut blur)]),
+        })
     }
-    Ok(Scattered {
-        name: "texture_space",
-        title: "texture space",
-        view: output,
-        runs: both.len(),
-        ms: median(&mut both),
-        atlas_ms: Some([median(&mut raster), median(&mut blur)]),
-    })
 }
 
-fn more_runs(done: usize, since: Instant) -> bool {
-    done == 0 || (done < TIMED_RUNS && since.elapsed().as_secs_f64() < TIMED_SECONDS)
+/// As people write it: 1/255 for .00392.
+fn fraction(error: f32) -> String {
+    let parts = error.recip().round();
+    match (error * parts - 1.0).abs() < 1e-3 && parts > 1.0 {
+        true => format!("1/{parts}"),
+        false => error.to_string(),
+    }
+}
+
+fn more_runs(done: usize, most: usize, since: Instant) -> bool {
+    done == 0 || (done < most && since.elapsed().as_secs_f64() < TIMED_SECONDS)
 }
 
 fn median(values: &mut [f64]) -> f64 {
@@ -420,24 +488,21 @@ struct Skin {
 }
 
 impl Skin {
-    fn read(gpu: &Gpu, renderer: &Renderer, camera: &Camera, options: &Options) -> Self {
-        let g = &renderer.gbuffer;
+    fn read(gpu: &Gpu, shot: &Shot) -> Self {
+        let g = &shot.renderer.gbuffer;
         let skin: Vec<bool> = gpu
             .read_bytes(g.profile_id.texture())
             .iter()
             .map(|id| *id == 1) // the one profile
             .collect();
         let depth: Vec<f32> = bytemuck::pod_collect_to_vec(&gpu.read_bytes(g.depth.texture()));
-        let inverse = camera
-            .projection(options.size)
-            .as_dmat4()
-            .inverse()
-            .as_mat4();
+        let projection = shot.camera.projection(shot.size);
+        let inverse = projection.as_dmat4().inverse().as_mat4();
         let area = depth
             .iter()
             .zip(gpu.read(&g.normal))
             .enumerate()
-            .map(|(i, (depth, normal))| area(i, *depth, normal, inverse, options.size))
+            .map(|(i, (depth, normal))| area(i, *depth, normal, inverse, shot.size))
             .collect();
         let albedo = gpu
             .read(&g.albedo)
@@ -498,30 +563,21 @@ struct Measured {
     layers: Vec<(&'static str, Layer)>,
 }
 
-fn measure(
-    gpu: &Gpu,
-    renderer: &Renderer,
-    frame: &Skin,
-    modes: &[Scattered],
-    options: &Options,
-) -> Measured {
-    let [width, height] = options.size;
+fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: f32) -> Measured {
+    let [width, height] = shot.size;
+    let modes = &shot.modes;
     let layer = |pixels: Vec<[f32; 3]>| Layer {
         width,
         height,
         pixels,
     };
-    let irradiance: Vec<Layer> = modes
-        .iter()
-        .map(|m| {
-            layer(
-                gpu.read(&m.view)
-                    .iter()
-                    .map(|p| [p[0], p[1], p[2]])
-                    .collect(),
-            )
-        })
-        .collect();
+    let light = |m: &Scattered| {
+        gpu.read(&m.view)
+            .iter()
+            .map(|p| [p[0], p[1], p[2]])
+            .collect()
+    };
+    let irradiance: Vec<Layer> = modes.iter().map(|m| layer(light(m))).collect();
     let radiance: Vec<Layer> = irradiance
         .iter()
         .map(|e| {
@@ -529,12 +585,20 @@ fn measure(
             layer(lit.map(|(e, a)| (Vec3::from(*e) * *a).to_array()).collect())
         })
         .collect();
-    let picture = |m: &Scattered, shown| {
-        let pixels = renderer.compose(gpu, &m.view, shown, options.exposure);
+    let picture = |shot: &Shot, i: usize, shown| {
+        let [width, height] = shot.size;
+        let diffuse = &shot.modes[i].view;
+        let pixels = shot.renderer.compose(gpu, diffuse, shown, exposure);
         RgbImage::from_raw(width, height, pixels.into_flattened())
             .expect("the renderer gives a picture of its size")
     };
-    let pictures: Vec<_> = modes.iter().map(|m| picture(m, Shown::Picture)).collect();
+    let smooth = |i, shown| match fine {
+        Some(fine) => srgb::halved(&picture(fine, i, shown)),
+        None => picture(shot, i, shown),
+    };
+    let pictures: Vec<_> = (0..modes.len())
+        .map(|i| picture(shot, i, Shown::Picture))
+        .collect();
 
     // The rim of a silhouette is left out: there a pixel's E is as much of the edge as of the skin.
     let inner = metrics::erode(&frame.skin, width, height, 2);
@@ -561,7 +625,7 @@ fn measure(
         let flip = reference.map(|r| metrics::flip_mean(&pictures[i], &pictures[r], &inner));
         reports.push(ModeReport {
             name: mode.name,
-            title: mode.title,
+            title: mode.title.clone(),
             ms: mode.ms,
             ms_raster: mode.atlas_ms.map(|[raster, _]| raster),
             ms_blur: mode.atlas_ms.map(|[_, blur]| blur),
@@ -578,8 +642,8 @@ fn measure(
             flip_mean: flip.as_ref().and_then(|(mean, _)| *mean),
             energy_ratio: Some(energy(&irradiance[i]) / energy(&irradiance[0]))
                 .filter(|ratio| ratio.is_finite()),
-            picture: pictures[i].clone(),
-            diffuse: picture(mode, Shown::Diffuse),
+            picture: smooth(i, Shown::Picture),
+            diffuse: smooth(i, Shown::Diffuse),
             difference: reference
                 .map(|r| metrics::difference(&irradiance[i], &irradiance[r], DIFFERENCE_GAIN)),
             flip: flip.map(|(_, heat)| heat),

@@ -1,225 +1,201 @@
-//! Channels of an OpenEXR file.
+//! Channels of an OpenEXR file, picked by the name of their layer.
 
+use std::fmt::Display;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
 use crate::Error;
-use exr::block::reader::Reader;
-use exr::meta::attribute::{SampleType, Text};
-use exr::meta::header::Header;
-use exr::prelude::{ReadChannels as _, ReadLayers as _, ReadSpecificChannel as _, Vec2, read};
-
-/// What red, green and blue are called: channels of colours, and of vectors.
-pub const RGB: [[&str; 3]; 1] = [["R", "G", "B"]];
-pub const RGB_OR_XYZ: [[&str; 3]; 2] = [["R", "G", "B"], ["X", "Y", "Z"]];
+use exr::block::UncompressedBlock;
+use exr::block::reader::{ChunksReader as _, Reader};
+use exr::meta::attribute::SampleType;
+use exr::meta::{MetaData, header::Header};
+use exr::prelude::{Compression, Vec2, f16};
 
 /// Pixels, row by row over the display window; 0 where the file has none.
-pub struct Pixels<T = [f32; 3]> {
-    pub values: Vec<T>,
+pub struct Pixels {
+    /// R, G and B. Of a file that has one channel, three times the same.
+    pub rgb: Vec<[f32; 3]>,
     /// Whether they were half floats in the file.
-    pub half: bool,
+    pub is_half: bool,
 }
 
-/// An open file, of which no pixel has been read.
-struct Source<'a> {
-    path: &'a Path,
-    reader: Reader<BufReader<File>>,
+/// Where a channel lies in a file of one or more parts.
+struct Channel {
+    part: usize,
+    index: usize,
+    /// In full, with the names of the part and of the layer before its own.
+    name: String,
+    sample: SampleType,
 }
 
-/// Three channels, with or without a layer's name before theirs.
-///
-/// # Errors
-/// A file that cannot be read, of another size, or without just one such triple.
-pub fn read_three(path: &Path, size: [u32; 2], names: &[[&str; 3]]) -> Result<Pixels, Error> {
-    let source = Source::open(path, size)?;
-    match source.triples(names).as_slice() {
-        [(part, triple)] => source.three(*part, triple),
-        _ => {
-            let names: Vec<_> = names.iter().map(|n| n.join(", ")).collect();
-            Err(source.other_channels(&format!("one each of {}", names.join(" or "))))
-        }
+impl Channel {
+    /// The name of its layer, and its own.
+    fn split(&self) -> (&str, &str) {
+        self.name.rsplit_once('.').unwrap_or(("", &self.name))
+    }
+
+    /// How well a name fits its layer or itself: 2 in full, 1 at the end after a dot.
+    fn fits(&self, name: &str) -> u8 {
+        let fit = |full: &str| match full.strip_suffix(name) {
+            Some("") => 2,
+            Some(before) if before.ends_with('.') => 1,
+            _ => 0,
+        };
+        fit(self.split().0).max(fit(&self.name))
     }
 }
 
-/// The one channel beside alpha, whatever its name; or red, green and blue that say the same.
+/// Reads R, G and B; or, for an input of `one` channel, the only one beside alpha, whatever its name.
+/// `layer` is the name of a layer or channel, in full or from a dot on: `Depth` finds `ViewLayer.Depth`.
+/// Without it the whole file is searched.
 ///
 /// # Errors
-/// A file that cannot be read, of another size, or with several channels that differ.
-pub fn read_one(path: &Path, size: [u32; 2]) -> Result<Pixels<f32>, Error> {
-    let source = Source::open(path, size)?;
-    let headers = source.reader.headers().iter().enumerate();
-    let channels: Vec<_> = headers
-        .flat_map(|(i, header)| channel_names(header).into_iter().map(move |n| (i, n)))
-        .filter(|(_, name)| name != "A" && !name.ends_with(".A"))
-        .collect();
-    if let [(part, name)] = channels.as_slice() {
-        return source.one(*part, name);
+/// A file that cannot be read, of another size, or without just one channel or triple that fits.
+pub fn read(path: &Path, layer: Option<&str>, size: [u32; 2], one: bool) -> Result<Pixels, Error> {
+    let input = path.display();
+    let refuse = |error: &dyn Display, needs| Error::new(&input, format!("\"{error}\""), needs);
+    let bad_exr = |e: exr::error::Error| refuse(&e, "an OpenEXR file that can be read");
+    let file = File::open(path).map_err(|e| refuse(&e, "a file that can be read"))?;
+    let reader = exr::block::read(BufReader::new(file), false).map_err(bad_exr)?;
+    for header in reader.headers() {
+        check(header, size).map_err(|e| e.within(&input))?;
     }
-    let refused =
-        source.other_channels("one channel beside alpha, or R, G and B that say the same");
-    let triples = source.triples(&RGB);
-    let (3, [(part, triple)]) = (channels.len(), triples.as_slice()) else {
-        return Err(refused);
+    let all = channels(reader.headers());
+    let fit = |c: &Channel| layer.map_or(1, |name| c.fits(name));
+    let best = all.iter().map(fit).max().unwrap_or(0);
+    let found = all.iter().filter(|c| best > 0 && fit(c) == best);
+    let Some(picked) = pick(&found.collect::<Vec<_>>(), one) else {
+        let names: Vec<_> = all.iter().map(|c| c.name.as_str()).collect();
+        let what = ["one each of R, G, B", "one beside alpha"][usize::from(one)];
+        let needs = match layer {
+            Some(layer) => format!("{what} in a layer called {layer}"),
+            None => format!("{what}; \"layer\" in gbuffer.json picks one of several"),
+        };
+        return Err(Error::new(
+            format!("{input}: channels"),
+            names.join(", "),
+            needs,
+        ));
     };
-    let Pixels { values, half } = source.three(*part, triple)?;
-    // A NaN is not itself, but is to be named as what it is.
-    let same = |[r, g, b]: &[f32; 3]| (r == g && g == b) || !(r + g + b).is_finite();
-    if !values.iter().all(same) {
-        return Err(refused);
-    }
-    let first = |v: &[f32; 3]| v.iter().find(|c| !c.is_finite()).copied().unwrap_or(v[0]);
-    let values = values.iter().map(first).collect();
-    Ok(Pixels { values, half })
+    Ok(Pixels {
+        rgb: decode(reader, picked).map_err(bad_exr)?,
+        is_half: picked[0].sample == SampleType::F16,
+    })
 }
 
-impl<'a> Source<'a> {
-    fn open(path: &'a Path, size: [u32; 2]) -> Result<Self, Error> {
-        let input = path.display().to_string();
-        let file = File::open(path)
-            .map_err(|e| Error::new(&input, format!("\"{e}\""), "a file that can be read"))?;
-        let reader =
-            exr::block::read(BufReader::new(file), false).map_err(|e| bad_exr(path, &e))?;
-        // Before pixels are decoded: a few damaged bytes can ask for all memory.
-        for header in reader.headers() {
-            let Vec2(width, height) = header.shared_attributes.display_window.size;
-            if [width, height] != size.map(|s| s as usize) {
-                return Err(Error::new(
-                    format!("{input}: size"),
-                    format!("{width}x{height}"),
-                    format!("{}x{} as gbuffer.json says", size[0], size[1]),
-                ));
+/// Checks a part before its pixels are decoded: a few damaged bytes can ask for all memory, by its windows
+/// or by the sizes in DWA's data.
+fn check(header: &Header, [width, height]: [u32; 2]) -> Result<(), Error> {
+    let Vec2(w, h) = header.shared_attributes.display_window.size;
+    if [w, h] != [width as usize, height as usize] {
+        let needs = format!("{width}x{height} as gbuffer.json says");
+        return Err(Error::new("size", format!("{w}x{h}"), needs));
+    }
+    let Vec2(data_w, data_h) = header.layer_size;
+    if data_w > 2 * w || data_h > 2 * h {
+        let got = format!("{data_w}x{data_h}");
+        return Err(Error::new("data window", got, "at most twice the frame"));
+    }
+    if let Compression::DWAA(_) | Compression::DWAB(_) = header.compression {
+        return Err(Error::new("compression", "DWA", "another, such as ZIP"));
+    }
+    Ok(())
+}
+
+/// All channels of all parts, but of deep ones.
+fn channels(headers: &[Header]) -> Vec<Channel> {
+    let mut channels = Vec::new();
+    for (part, header) in headers.iter().enumerate().filter(|(_, h)| !h.deep) {
+        let prefix = header.own_attributes.layer_name.as_ref();
+        let prefix = prefix.map_or(String::new(), |name| format!("{name}."));
+        for (index, channel) in header.channels.list.iter().enumerate() {
+            let mut name = channel.name.to_string();
+            if !name.starts_with(&prefix) {
+                name.insert_str(0, &prefix);
             }
-            let Vec2(data_width, data_height) = header.layer_size;
-            if data_width > 2 * width || data_height > 2 * height {
-                return Err(Error::new(
-                    format!("{input}: data window"),
-                    format!("{data_width}x{data_height}"),
-                    format!("at most twice the frame, {}x{}", 2 * width, 2 * height),
-                ));
-            }
+            let sample = channel.sample_type;
+            channels.push(Channel {
+                part,
+                index,
+                name,
+                sample,
+            });
         }
-        Ok(Self { path, reader })
     }
+    channels
+}
 
-    fn other_channels(&self, needs: &str) -> Error {
-        let headers = self.reader.headers().iter();
-        let names: Vec<_> = headers.flat_map(channel_names).collect();
-        let input = format!("{}: channels", self.path.display());
-        Error::new(input, names.join(", "), needs)
-    }
-
-    /// Where all three of some names are: the part of the file, and the channels in full.
-    fn triples(&self, names: &[[&str; 3]]) -> Vec<(usize, [String; 3])> {
-        let mut found = Vec::new();
-        for (part, header) in self.reader.headers().iter().enumerate() {
-            let all = channel_names(header);
-            for name in &all {
-                let layer = &name[..name.rfind('.').map_or(0, |dot| dot + 1)];
-                let triples = names.iter().map(|n| n.map(|c| format!("{layer}{c}")));
-                found.extend(
-                    triples
-                        .filter(|t| t[0] == *name && t.iter().all(|c| all.contains(c)))
-                        .map(|triple| (part, triple)),
-                );
-            }
-        }
-        found
-    }
-
-    /// Three channels of a part of the file.
-    fn three(self, part: usize, names: &[String; 3]) -> Result<Pixels, Error> {
-        let header = &self.reader.headers()[part];
-        let half = is_half(header, &names[0]);
-        let (count, place) = window(header);
-        let [r, g, b] = names.each_ref().map(|n| Text::from(n.as_str()));
-        let channels = read()
-            .no_deep_data()
-            .largest_resolution_level()
-            .specific_channels()
-            .required(r)
-            .required(g)
-            .required(b)
-            .collect_pixels(
-                move |_, _| vec![[0.0; 3]; count],
-                move |pixels: &mut Vec<[f32; 3]>, at, (r, g, b): (f32, f32, f32)| {
-                    if let Some(i) = place(at) {
-                        pixels[i] = [r, g, b];
-                    }
-                },
-            );
-        let image = channels
-            .first_valid_layer()
-            .all_attributes()
-            .non_parallel()
-            .from_chunks(self.reader)
-            .map_err(|e| bad_exr(self.path, &e))?;
-        let values = image.layer_data.channel_data.pixels;
-        Ok(Pixels { values, half })
-    }
-
-    /// One channel of a part of the file.
-    fn one(self, part: usize, name: &str) -> Result<Pixels<f32>, Error> {
-        let header = &self.reader.headers()[part];
-        let half = is_half(header, name);
-        let (count, place) = window(header);
-        let channels = read()
-            .no_deep_data()
-            .largest_resolution_level()
-            .specific_channels()
-            .required(name)
-            .collect_pixels(
-                move |_, _| vec![0.0; count],
-                move |pixels: &mut Vec<f32>, at, (value,): (f32,)| {
-                    if let Some(i) = place(at) {
-                        pixels[i] = value;
-                    }
-                },
-            );
-        let image = channels
-            .first_valid_layer()
-            .all_attributes()
-            .non_parallel()
-            .from_chunks(self.reader)
-            .map_err(|e| bad_exr(self.path, &e))?;
-        let values = image.layer_data.channel_data.pixels;
-        Ok(Pixels { values, half })
+/// The one triple of R, G and B in a layer; or, for an input of `one` channel, that channel three times, or
+/// a triple that is alone.
+fn pick<'a>(channels: &[&'a Channel], one: bool) -> Option<[&'a Channel; 3]> {
+    let find = |like: &Channel, name| {
+        let is = |c: &&Channel| c.part == like.part && c.split() == (like.split().0, name);
+        channels.iter().copied().find(is)
+    };
+    let reds = channels.iter().filter(|c| c.split().1 == "R");
+    let triples = reds.filter_map(|c| Some([*c, find(c, "G")?, find(c, "B")?]));
+    let triples: Vec<_> = triples.collect();
+    let opaque = channels.iter().copied().filter(|c| c.split().1 != "A");
+    let opaque: Vec<_> = opaque.collect();
+    match (one, &*opaque, &*triples) {
+        (true, &[channel], _) => Some([channel; 3]),
+        (true, &[_, _, _], &[triple]) | (false, _, &[triple]) => Some(triple),
+        _ => None,
     }
 }
 
-fn is_half(header: &Header, name: &str) -> bool {
-    let mut channels = header.channels.list.iter();
-    channels.any(|c| c.name == *name && c.sample_type == SampleType::F16)
-}
-
-/// How many pixels the display window has, and where in it a pixel of the data window lies: the two
-/// need not be the same.
-fn window(header: &Header) -> (usize, impl Fn(Vec2<usize>) -> Option<usize> + use<>) {
-    let window = header.shared_attributes.display_window;
-    let offset = header.own_attributes.layer_position;
-    let shift = |at: i32, from: i32| i64::from(at) - i64::from(from);
-    let (dx, dy) = (
-        shift(offset.x(), window.position.x()),
-        shift(offset.y(), window.position.y()),
+/// Three channels of one part, over the display window.
+fn decode(
+    reader: Reader<BufReader<File>>,
+    picked: [&Channel; 3],
+) -> exr::error::Result<Vec<[f32; 3]>> {
+    let part = picked[0].part;
+    let header = &reader.headers()[part];
+    // The data window may be smaller or larger than the display window, and elsewhere.
+    let (display, data) = (
+        header.shared_attributes.display_window,
+        header.own_attributes.layer_position,
     );
-    let Vec2(width, height) = window.size;
-    let place = move |at: Vec2<usize>| {
-        let x = usize::try_from(at.x() as i64 + dx).ok()?;
-        let y = usize::try_from(at.y() as i64 + dy).ok()?;
+    let Vec2(width, height) = display.size;
+    let place = move |Vec2(x, y): Vec2<usize>| {
+        let shifted = |at, from: i32, to: i32| at as i64 + i64::from(from) - i64::from(to);
+        let x = usize::try_from(shifted(x, data.0, display.position.0)).ok()?;
+        let y = usize::try_from(shifted(y, data.1, display.position.1)).ok()?;
         (x < width && y < height).then_some(y * width + x)
     };
-    (width * height, place)
+    let mut pixels = vec![[0.0; 3]; width * height];
+    let put = |meta: &MetaData, block: UncompressedBlock| {
+        // A damaged table of chunks may lead to any.
+        if block.index.layer != part || block.index.level != Vec2(0, 0) {
+            return Ok(());
+        }
+        for line in block.lines(&meta.headers[part].channels) {
+            let index = line.location.channel;
+            for (c, channel) in picked.iter().enumerate().filter(|(_, p)| p.index == index) {
+                let samples = line.value.chunks_exact(channel.sample.bytes_per_sample());
+                for (i, bytes) in samples.enumerate() {
+                    if let Some(at) = place(line.location.position + Vec2(i, 0)) {
+                        pixels[at][c] = to_f32(channel.sample, bytes);
+                    }
+                }
+            }
+        }
+        Ok(())
+    };
+    reader
+        .filter_chunks(false, |_, tile, block| {
+            block.layer == part && tile.is_largest_resolution_level()
+        })?
+        .decompress_sequential(false, put)?;
+    Ok(pixels)
 }
 
-fn channel_names(header: &Header) -> Vec<String> {
-    let channels = header.channels.list.iter();
-    channels.map(|channel| channel.name.to_string()).collect()
-}
-
-fn bad_exr(path: &Path, error: &exr::error::Error) -> Error {
-    Error::new(
-        path.display().to_string(),
-        format!("\"{error}\""),
-        "an OpenEXR file that can be read",
-    )
+/// A sample in the byte order of this machine.
+fn to_f32(sample: SampleType, bytes: &[u8]) -> f32 {
+    match sample {
+        SampleType::F16 => f16::from_bits(bytemuck::pod_read_unaligned(bytes)).to_f32(),
+        SampleType::F32 => bytemuck::pod_read_unaligned(bytes),
+        SampleType::U32 => bytemuck::pod_read_unaligned::<u32>(bytes) as f32,
+    }
 }

@@ -1,44 +1,92 @@
 //! A dumped frame: `gbuffer.json`, and the EXR files that it names.
 
+use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use crate::Error;
 use glam::{DMat4, Mat4};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 
 use crate::filter::channels::{self, Pixels};
+use crate::filter::read_text;
 
-/// `gbuffer.json`.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Json {
-    width: u32,
-    height: u32,
-    projection: Vec<f64>,
-    mm_per_unit: f64,
-    files: Files,
-}
+/// What Blender writes to *Z* where nothing is.
+const BACKGROUND: f32 = 1e10;
 
-/// Paths, from where `gbuffer.json` is.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Files {
-    irradiance: PathBuf,
-    depth: PathBuf,
-    normal: Option<PathBuf>,
-    profile_id: Option<PathBuf>,
-}
+/// Keys that mean nothing here.
+type Unknown = BTreeMap<String, IgnoredAny>;
 
 /// What `gbuffer.json` says.
+#[derive(Deserialize)]
+#[serde(expecting = "an object")]
 pub struct Camera {
-    pub size: [u32; 2],
-    /// View to clip space.
-    pub projection: Mat4,
+    width: u32,
+    height: u32,
+    /// View to clip space, column by column.
+    projection: [f32; 16],
     pub mm_per_unit: f32,
-    case: PathBuf,
-    /// Of `gbuffer.json`.
-    path: PathBuf,
     files: Files,
+    #[serde(flatten)]
+    unknown: Unknown,
+    /// The directory.
+    #[serde(skip)]
+    case: PathBuf,
+}
+
+#[derive(Deserialize)]
+#[serde(expecting = "an object")]
+struct Files {
+    irradiance: Layers,
+    depth: Layers,
+    profile_id: Option<Layers>,
+    #[serde(flatten)]
+    unknown: Unknown,
+}
+
+/// Where an input is: layers that are added up.
+#[derive(Deserialize)]
+#[serde(try_from = "Source")]
+struct Layers(Vec<Layer>);
+
+#[derive(Deserialize)]
+struct Layer {
+    /// From the directory of `gbuffer.json`.
+    file: PathBuf,
+    /// None: the file has just one that fits.
+    layer: Option<String>,
+    #[serde(flatten)]
+    unknown: Unknown,
+}
+
+/// How a user writes it.
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected a path, {\"file\": path, \"layer\": name} or a list of these to add up"
+)]
+enum Source {
+    File(PathBuf),
+    Layer(Layer),
+    Sum(Vec<Layers>),
+}
+
+impl TryFrom<Source> for Layers {
+    type Error = &'static str;
+
+    fn try_from(source: Source) -> Result<Self, Self::Error> {
+        Ok(Self(match source {
+            Source::Sum(layers) if layers.is_empty() => return Err("an empty list of files"),
+            Source::Sum(layers) => layers.into_iter().flat_map(|l| l.0).collect(),
+            Source::Layer(layer) => vec![layer],
+            Source::File(file) => vec![Layer {
+                file,
+                layer: None,
+                unknown: Unknown::new(),
+            }],
+        }))
+    }
 }
 
 impl Camera {
@@ -46,55 +94,83 @@ impl Camera {
     /// A file that cannot be read, or whose numbers cannot be those of a camera.
     pub fn read(case: &Path) -> Result<Self, Error> {
         let path = case.join("gbuffer.json");
-        let input = path.display().to_string();
-        let text = std::fs::read_to_string(&path)
-            .map_err(|e| Error::new(&input, format!("\"{e}\""), "a file that can be read"))?;
-        let json: Json = serde_json::from_str(&text).map_err(|e| {
-            let needs = "width, height, projection, mm_per_unit, and files: irradiance, depth, \
-                         optionally normal and profile_id";
-            Error::new(&input, format!("\"{e}\""), needs)
+        let mut camera: Self = serde_json::from_str(&read_text(&path)?).map_err(|e| {
+            let needs = "width, height, projection (16 numbers), mm_per_unit, and files: \
+                         irradiance, depth, optionally profile_id";
+            Error::new(path.display(), format!("\"{e}\""), needs)
         })?;
-        let refused = |what: &str, got: String, needs: &str| {
-            Err(Error::new(format!("{input}: {what}"), got, needs))
-        };
-        let floats: Vec<f32> = json.projection.iter().map(|x| *x as f32).collect();
-        let Ok(columns) = <[f32; 16]>::try_from(floats.as_slice()) else {
-            let got = format!("{} numbers", floats.len());
-            return refused("projection", got, "16, column by column");
-        };
-        let projection = Mat4::from_cols_array(&columns);
-        if !projection.is_finite() || !projection.as_dmat4().inverse().is_finite() {
-            let needs = "a finite matrix that can be inverted";
-            return refused("projection", projection.to_string(), needs);
+        camera.case = case.to_owned();
+        let p = camera.projection();
+        let [x, y, z, w] = [0, 1, 2, 3].map(|i| p.row(i));
+        let is_apart = [x.y, y.x, z.x, z.y, w.x, w.y].iter().all(|c| *c == 0.0);
+        let looks_down = w.z < 0.0 || (w.z == 0.0 && w.w > 0.0);
+        let is_finite = p.is_finite() && p.as_dmat4().inverse().is_finite();
+        if !(is_finite && is_apart && looks_down) {
+            let needs = "a finite matrix, column by column, that can be inverted and looks down \
+                         -Z, and whose x, y and depth stay apart";
+            return Err(camera.error(Error::new("projection", p, needs)));
         }
-        let [x, y, z, w] = [0, 1, 2, 3].map(|i| projection.row(i));
-        if [x.y, y.x, z.x, z.y, w.x, w.y].iter().any(|c| *c != 0.0) {
-            let needs = "x and y that stay apart, depth that does not depend on them, and columns, \
-                         not rows, one after the other";
-            return refused("projection", projection.to_string(), needs);
-        }
-        let mm_per_unit = json.mm_per_unit as f32;
-        if !mm_per_unit.is_finite() || mm_per_unit <= 0.0 {
-            let got = json.mm_per_unit.to_string();
-            return refused("mm_per_unit", got, "a finite number above 0");
-        }
-        Ok(Self {
-            size: [json.width, json.height],
-            projection,
-            mm_per_unit,
-            case: case.to_owned(),
-            path,
-            files: json.files,
-        })
+        Ok(camera)
+    }
+
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
+    pub fn projection(&self) -> Mat4 {
+        Mat4::from_cols_array(&self.projection)
+    }
+
+    /// Keys that are not read.
+    pub fn unknown(&self) -> Vec<String> {
+        let files = &self.files;
+        let inputs = [&files.irradiance, &files.depth].into_iter();
+        let layers = inputs.chain(&files.profile_id).flat_map(|l| &l.0);
+        let inner = layers.flat_map(|l| l.unknown.keys());
+        let inner = files.unknown.keys().chain(inner);
+        let inner = inner.map(|key| format!("files: {key}"));
+        self.unknown.keys().cloned().chain(inner).collect()
     }
 
     /// What is wrong with it, with the file's name.
     pub fn error(&self, error: Error) -> Error {
-        error.within(self.path.display())
+        error.within(self.case.join("gbuffer.json").display())
     }
 
-    fn file(&self, path: &Path) -> PathBuf {
-        self.case.join(path)
+    /// The pixels of a layer, and the path of its file.
+    fn layer(&self, layer: &Layer, one: bool) -> Result<(PathBuf, Pixels), Error> {
+        let path = self.case.join(&layer.file);
+        let pixels = channels::read(&path, layer.layer.as_deref(), self.size(), one)?;
+        Ok((path, pixels))
+    }
+
+    /// Reads an input of one channel; with its path, and whether it was in half floats.
+    fn one(&self, input: &str, layers: &Layers) -> Result<(PathBuf, Vec<f32>, bool), Error> {
+        let [layer] = &*layers.0 else {
+            let got = format!("a list of {}", layers.0.len());
+            let error = Error::new(format!("files: {input}"), got, "one file or layer");
+            return Err(self.error(error));
+        };
+        let (path, Pixels { rgb, is_half }) = self.layer(layer, true)?;
+        // What is not finite is named later.
+        let differ = |&[r, g, b]: &[f32; 3]| (r != g || g != b) && (r + g + b).is_finite();
+        if let Some(at) = rgb.iter().position(differ) {
+            let got = format!("{:?}", rgb[at]);
+            return Err(self.bad_pixel(
+                &path,
+                at,
+                &got,
+                "one channel, or R, G and B that are equal",
+            ));
+        }
+        let of = |&[r, g, b]: &[f32; 3]| if r == g && g == b { r } else { r + g + b };
+        Ok((path, rgb.iter().map(of).collect(), is_half))
+    }
+
+    /// An error that names a file, and a pixel by its column and row from the top left.
+    fn bad_pixel(&self, path: &Path, at: usize, got: impl Display, needs: &str) -> Error {
+        let [x, y] = [at % self.width as usize, at / self.width as usize];
+        Error::new(path.display(), format!("{got} at pixel ({x}, {y})"), needs)
     }
 }
 
@@ -102,10 +178,9 @@ impl Camera {
 pub struct Dump {
     pub camera: Camera,
     pub irradiance: Vec<[f32; 4]>,
-    /// In view space.
-    pub normal: Option<Vec<[f32; 4]>>,
-    /// As the projection writes it; 0 where nothing is.
+    /// As the projection writes it; that of the far plane where nothing is.
     pub depth: Vec<f32>,
+    /// 0 where nothing is.
     pub profile_id: Vec<u8>,
     pub depth_is_half: bool,
     /// How far the rounding of `depth` to a float moves a surface that scatters, at most.
@@ -118,76 +193,69 @@ impl Dump {
     /// # Errors
     /// The first pixel of the first file that cannot be used.
     pub fn read(camera: Camera, profiles: usize) -> Result<Self, Error> {
-        let size = camera.size;
-        let path = camera.file(&camera.files.irradiance);
-        let Pixels { values, .. } = channels::read_three(&path, size, &channels::RGB)?;
-        check(&path, size, values.as_flattened(), "finite light", |_| true)?;
-        let irradiance = values.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
-
-        let normal = match &camera.files.normal {
-            None => None,
-            Some(path) => {
-                let path = camera.file(path);
-                let Pixels { values, .. } =
-                    channels::read_three(&path, size, &channels::RGB_OR_XYZ)?;
-                check(&path, size, values.as_flattened(), "finite vectors", |_| {
-                    true
-                })?;
-                Some(values.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect())
-            }
-        };
-
-        let path = camera.file(&camera.files.depth);
-        let distance = channels::read_one(&path, size)?;
-        let needs = "distances along −Z, 0 where nothing is";
-        check(&path, size, &distance.values, needs, |z| z >= 0.0)?;
-        let depth_is_half = distance.half;
-        let distance = distance.values;
-
-        let mut profile_id: Vec<u8> = match &camera.files.profile_id {
-            None => vec![1; distance.len()],
-            Some(path) => {
-                let path = camera.file(path);
-                let ids = channels::read_one(&path, size)?.values;
-                let needs = format!("whole numbers from 0 to {profiles}, the last --profile");
-                check(&path, size, &ids, &needs, |id| {
-                    id.fract() == 0.0 && (0.0..=profiles as f32).contains(&id)
-                })?;
-                ids.iter().map(|id| *id as u8).collect()
-            }
-        };
-        for (id, distance) in profile_id.iter_mut().zip(&distance) {
-            if *distance == 0.0 {
-                *id = 0;
+        let projection = camera.projection();
+        let mut irradiance = Vec::new();
+        for layer in &camera.files.irradiance.0 {
+            let (path, Pixels { rgb, .. }) = camera.layer(layer, false)?;
+            irradiance.resize(rgb.len(), [0.0, 0.0, 0.0, 1.0]);
+            for (i, &light) in rgb.as_flattened().iter().enumerate() {
+                let sum = &mut irradiance[i / 3][i % 3];
+                *sum += light;
+                if !sum.is_finite() {
+                    return Err(camera.bad_pixel(&path, i / 3, light, "finite light"));
+                }
             }
         }
 
-        let mut depth = Vec::with_capacity(distance.len());
-        let mut depth_error_mm: f64 = 0.0;
-        for (i, (&distance, id)) in distance.iter().zip(&profile_id).enumerate() {
-            if distance == 0.0 {
-                depth.push(0.0);
-                continue;
+        let (depth_path, distance, depth_is_half) = camera.one("depth", &camera.files.depth)?;
+        let has_ids = camera.files.profile_id.is_some();
+        let mut profile_id = vec![1; distance.len()];
+        if let Some(source) = &camera.files.profile_id {
+            let (path, ids, _) = camera.one("profile_id", source)?;
+            let needs = format!("whole numbers from 0 to {profiles}, the last --profile");
+            for (at, id) in ids.into_iter().enumerate() {
+                if id.fract() != 0.0 || !(0.0..=profiles as f32).contains(&id) {
+                    return Err(camera.bad_pixel(&path, at, id, &needs));
+                }
+                profile_id[at] = id as u8;
             }
-            let Some((written, error)) = write_depth(camera.projection, distance) else {
-                let got = format!("no depth for {distance} at {}", pixel(i, size));
-                let needs = "a right-handed projection that looks down −Z, of such distances";
-                return Err(camera.error(Error::new("projection", got, needs)));
-            };
-            depth.push(written);
-            if *id > 0 {
-                depth_error_mm = depth_error_mm.max(error * f64::from(camera.mm_per_unit));
+        }
+
+        // Whether depth grows with the distance.
+        let Mat4 { z_axis, w_axis, .. } = projection;
+        let is_forward = z_axis.z * w_axis.w < w_axis.z * z_axis.w;
+        let mut depth = vec![if is_forward { 1.0 } else { 0.0 }; distance.len()];
+        let mut depth_error_mm: f64 = 0.0;
+        for (at, &distance) in distance.iter().enumerate() {
+            let id = &mut profile_id[at];
+            if distance == 0.0 || distance >= BACKGROUND {
+                *id = 0;
+            } else if let Some((written, error)) = write_depth(projection, distance) {
+                depth[at] = written;
+                if *id > 0 {
+                    depth_error_mm = depth_error_mm.max(error * f64::from(camera.mm_per_unit));
+                }
+            } else if !has_ids || *id > 0 {
+                let needs = "a distance along -Z that has a depth by projection; where nothing is, \
+                             0, 1e10 or more, or a profile_id of 0";
+                return Err(camera.bad_pixel(&depth_path, at, distance, needs));
             }
         }
         Ok(Self {
             camera,
             irradiance,
-            normal,
             depth,
             profile_id,
             depth_is_half,
             depth_error_mm,
         })
+    }
+
+    /// The largest irradiance of a pixel that scatters.
+    pub fn brightest(&self) -> f32 {
+        let pixels = self.irradiance.iter().zip(&self.profile_id);
+        let skin = pixels.filter(|(_, id)| **id > 0).flat_map(|(e, _)| &e[..3]);
+        skin.copied().fold(0.0, f32::max)
     }
 }
 
@@ -198,33 +266,11 @@ pub fn write_depth(projection: Mat4, distance: f32) -> Option<(f32, f64)> {
     let z = -f64::from(distance);
     let w = z_axis.w * z + w_axis.w;
     let depth = ((z_axis.z * z + w_axis.z) / w) as f32;
-    if !depth.is_finite() || w <= 0.0 {
+    if !depth.is_finite() || w <= 0.0 || distance < 0.0 {
         return None;
     }
     let d = f64::from(depth);
     let back = (w_axis.z - d * w_axis.w) / (d * z_axis.w - z_axis.z);
     let error = (back - z).abs();
     error.is_finite().then_some((depth, error))
-}
-
-/// Checks that all values, as many for each pixel, are finite and fit; names the first pixel where
-/// one does not.
-fn check(
-    path: &Path,
-    size: [u32; 2],
-    values: &[f32],
-    needs: &str,
-    fits: impl Fn(f32) -> bool,
-) -> Result<(), Error> {
-    let bad = values.iter().position(|v| !v.is_finite() || !fits(*v));
-    let Some(i) = bad else { return Ok(()) };
-    let channels = values.len() / (size[0] * size[1]) as usize;
-    let got = format!("{} at {}", values[i], pixel(i / channels, size));
-    Err(Error::new(path.display().to_string(), got, needs))
-}
-
-/// A pixel by its column and row, from the top left.
-fn pixel(i: usize, size: [u32; 2]) -> String {
-    let width = size[0] as usize;
-    format!("pixel ({}, {})", i % width, i / width)
 }

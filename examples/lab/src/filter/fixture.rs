@@ -1,185 +1,138 @@
 //! What the tests write for the filter to read.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::Error;
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
-    f16,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
+    LayerAttributes, Text, WritableImage, f16,
 };
 use glam::Mat4;
 use glam::camera::rh::proj::directx::perspective_infinite_reverse;
 use serde_json::{Value, json};
 
+use crate::filter::dump::{Camera, Dump};
 use crate::filter::options::Options;
 
-/// A directory of a test's own, removed when the test ends, also by a failure.
-pub struct Scratch(pub PathBuf);
+pub type Samples = fn(Vec<f32>) -> FlatSamples;
+pub const FLOATS: Samples = FlatSamples::F32;
+pub const HALVES: Samples = |v| FlatSamples::F16(v.into_iter().map(f16::from_f32).collect());
+pub const RGB: &[&str] = &["R", "G", "B"];
 
-impl Scratch {
-    pub fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("filter-{name}-{}", std::process::id()));
-        fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
+/// A dump in a directory of its own, which is removed when the test ends, also by a failure.
+pub struct Case {
+    pub dir: PathBuf,
+    pub size: [u32; 2],
 }
 
-impl Drop for Scratch {
+impl Drop for Case {
     fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
+        let _ = fs::remove_dir_all(&self.dir);
     }
 }
 
-pub fn floats(values: impl IntoIterator<Item = f32>) -> FlatSamples {
-    FlatSamples::F32(values.into_iter().collect())
-}
+impl Case {
+    /// A description, of files that are not there yet.
+    pub fn new(name: &str, size: [u32; 2], projection: Mat4) -> Self {
+        let dir = std::env::temp_dir().join(format!("filter-{name}-{}", std::process::id()));
+        fs::create_dir_all(&dir).unwrap();
+        let case = Self { dir, size };
+        case.json(&json!({
+            "width": size[0],
+            "height": size[1],
+            "projection": projection.to_cols_array(),
+            "mm_per_unit": 1000,
+            "files": {"irradiance": "light.exr", "depth": "depth.exr", "profile_id": "id.exr"},
+        }));
+        case
+    }
 
-pub fn halves(values: impl IntoIterator<Item = f32>) -> FlatSamples {
-    FlatSamples::F16(values.into_iter().map(f16::from_f32).collect())
-}
+    /// A plane half a unit away, of 8 × 4 pixels, that has nothing wrong.
+    pub fn plane(name: &str) -> Self {
+        let case = Self::new(name, [8, 4], perspective_infinite_reverse(0.1, 2.0, 0.01));
+        case.write("light.exr", RGB, FLOATS, |_, _| 0.5);
+        case.write("depth.exr", &["Z"], FLOATS, |_, _| 0.5);
+        case.write("id.exr", &["V"], HALVES, |_, _| 1.0);
+        case
+    }
 
-/// Writes channels, each with a value for every pixel.
-pub fn write(path: &Path, size: [u32; 2], channels: Vec<(&str, FlatSamples)>) {
-    write_as(path, size, channels, Encoding::SMALL_LOSSLESS);
-}
+    pub fn at(&self, name: &str) -> String {
+        self.dir.join(name).to_str().unwrap().to_owned()
+    }
 
-pub fn write_as(
-    path: &Path,
-    size: [u32; 2],
-    channels: Vec<(&str, FlatSamples)>,
-    encoding: Encoding,
-) {
-    let channels = channels.into_iter().map(|(n, s)| AnyChannel::new(n, s));
-    let layer = Layer::new(
-        (size[0] as usize, size[1] as usize),
-        LayerAttributes::default(),
-        encoding,
-        AnyChannels::sort(channels.collect()),
-    );
-    let image = Image::from_layer(layer);
-    image.write().non_parallel().to_file(path).unwrap();
-}
+    pub fn json(&self, json: &Value) {
+        fs::write(self.at("gbuffer.json"), json.to_string()).unwrap();
+    }
 
-pub fn rgb(
-    pixels: &[[f32; 4]],
-    samples: fn(Vec<f32>) -> FlatSamples,
-) -> Vec<(&'static str, FlatSamples)> {
-    let channel = |c: usize| samples(pixels.iter().map(|p| p[c]).collect());
-    ["R", "G", "B"]
-        .into_iter()
-        .zip([0, 1, 2].map(channel))
-        .collect()
-}
+    /// Another value at a place in `gbuffer.json`; null removes a key.
+    pub fn edit(&self, place: &str, value: Value) {
+        let text = fs::read(self.at("gbuffer.json")).unwrap();
+        let mut json: Value = serde_json::from_slice(&text).unwrap();
+        let (parent, key) = place.rsplit_once('/').unwrap();
+        match json.pointer_mut(parent).unwrap() {
+            Value::Object(map) if value.is_null() => drop(map.remove(key)),
+            Value::Object(map) => drop(map.insert(key.into(), value)),
+            list => list[key.parse::<usize>().unwrap()] = value,
+        }
+        self.json(&json);
+    }
 
-pub fn write_json(case: &Path, size: [u32; 2], projection: Mat4, files: &Value) {
-    let json = json!({
-        "width": size[0],
-        "height": size[1],
-        "projection": projection.to_cols_array(),
-        "mm_per_unit": 1000.0,
-        "files": files,
-    });
-    fs::write(case.join("gbuffer.json"), json.to_string()).unwrap();
+    /// A layer or part of some channels, of values by pixel and channel.
+    pub fn layer(
+        &self,
+        part: Option<&str>,
+        names: &[&str],
+        samples: Samples,
+        value: impl Fn(usize, usize) -> f32,
+    ) -> Layer<AnyChannels<FlatSamples>> {
+        let [width, height] = self.size.map(|s| s as usize);
+        let channels = names.iter().enumerate().map(|(c, name)| {
+            let values = (0..width * height).map(|i| value(i, c));
+            AnyChannel::new(*name, samples(values.collect()))
+        });
+        let attributes = LayerAttributes {
+            layer_name: part.map(Text::from),
+            ..Default::default()
+        };
+        let channels = AnyChannels::sort(channels.collect());
+        let encoding = Encoding::SMALL_LOSSLESS;
+        Layer::new((width, height), attributes, encoding, channels)
+    }
+
+    /// A file of one or more parts that fill the frame.
+    pub fn write_layers(&self, file: &str, layers: Vec<Layer<AnyChannels<FlatSamples>>>) {
+        let [width, height] = self.size.map(|s| s as usize);
+        let window = IntegerBounds::from_dimensions((width, height));
+        let image = Image::from_layers(ImageAttributes::new(window), layers);
+        image.write().non_parallel().to_file(self.at(file)).unwrap();
+    }
+
+    pub fn write(
+        &self,
+        file: &str,
+        names: &[&str],
+        samples: Samples,
+        value: impl Fn(usize, usize) -> f32,
+    ) {
+        self.write_layers(file, vec![self.layer(None, names, samples, value)]);
+    }
+
+    pub fn read(&self) -> Result<Dump, Error> {
+        Dump::read(Camera::read(&self.dir)?, 1)
+    }
+
+    /// Runs the filter.
+    pub fn run(&self, args: &[&str]) -> Result<Vec<[f32; 3]>, Error> {
+        let (dir, out) = (self.at(""), self.at("out.exr"));
+        run(&[&[&dir, "--out", &out], args].concat())?;
+        let picture = image::open(out).unwrap().into_rgb32f();
+        Ok(picture.pixels().map(|p| p.0).collect())
+    }
 }
 
 /// The filter's command line, but for the program's name.
 pub fn run(args: &[&str]) -> Result<(), Error> {
     let options = Options::parse(lexopt::Parser::from_args(args))?;
     crate::filter::filter(&options.expect("no help was asked for"))
-}
-
-pub fn read_rgb(path: &Path) -> Vec<[f32; 3]> {
-    let picture = image::open(path).unwrap().into_rgb32f();
-    picture.pixels().map(|p| p.0).collect()
-}
-
-/// A plane half a unit away, of 8 × 4 pixels, that has nothing wrong.
-pub struct Plane {
-    pub case: Scratch,
-}
-
-impl Plane {
-    pub const SIZE: [u32; 2] = [8, 4];
-    pub const PIXELS: usize = 32;
-
-    pub fn new(name: &str) -> Self {
-        let case = Scratch::new(name);
-        let files = json!({
-            "irradiance": "irradiance.exr",
-            "depth": "depth.exr",
-            "normal": "normal.exr",
-            "profile_id": "profile_id.exr",
-        });
-        write_json(&case.0, Self::SIZE, Self::projection(), &files);
-        let plane = Self { case };
-        plane.irradiance(|_, _| 0.5);
-        plane.normal(|_, c| if c == 2 { 1.0 } else { 0.0 });
-        plane.depth(|_| 0.5);
-        plane.ids(|_| 1.0);
-        plane
-    }
-
-    pub fn projection() -> Mat4 {
-        perspective_infinite_reverse(0.1, 2.0, 0.01)
-    }
-
-    pub fn at(&self, name: &str) -> PathBuf {
-        self.case.0.join(name)
-    }
-
-    pub fn three(&self, file: &str, names: [&str; 3], value: impl Fn(usize, usize) -> f32) {
-        let channel = |c| floats((0..Self::PIXELS).map(|i| value(i, c)));
-        let channels = names.into_iter().zip([0, 1, 2].map(channel)).collect();
-        write(&self.at(file), Self::SIZE, channels);
-    }
-
-    pub fn irradiance(&self, value: impl Fn(usize, usize) -> f32) {
-        self.three("irradiance.exr", ["R", "G", "B"], value);
-    }
-
-    pub fn normal(&self, value: impl Fn(usize, usize) -> f32) {
-        self.three("normal.exr", ["N.X", "N.Y", "N.Z"], value);
-    }
-
-    pub fn depth(&self, value: impl Fn(usize) -> f32) {
-        let values = floats((0..Self::PIXELS).map(value));
-        write(&self.at("depth.exr"), Self::SIZE, vec![("Z", values)]);
-    }
-
-    pub fn ids(&self, value: impl Fn(usize) -> f32) {
-        let values = halves((0..Self::PIXELS).map(value));
-        write(&self.at("profile_id.exr"), Self::SIZE, vec![("id", values)]);
-    }
-
-    /// Another value at a place in `gbuffer.json`.
-    pub fn json(&self, place: &str, value: Value) {
-        let path = self.at("gbuffer.json");
-        let mut json: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-        let (parent, key) = place.rsplit_once('/').unwrap();
-        let parent = json.pointer_mut(parent).unwrap();
-        match parent {
-            Value::Array(list) => list[key.parse::<usize>().unwrap()] = value,
-            _ if value == json!("none") => drop(parent.as_object_mut().unwrap().remove(key)),
-            _ => parent[key] = value,
-        }
-        fs::write(path, json.to_string()).unwrap();
-    }
-
-    /// Runs the filter with a loose error, so that its plan is quick.
-    pub fn run(&self, args: &[&str]) -> Result<Vec<[f32; 3]>, Error> {
-        let out = self.at("out.exr");
-        let common = [
-            self.case.0.to_str().unwrap(),
-            "--out",
-            out.to_str().unwrap(),
-        ];
-        let how: &[&str] = if args.contains(&"--exact") {
-            &[]
-        } else {
-            &["--max-error", "0.02"]
-        };
-        run(&[&common, how, args].concat())?;
-        Ok(read_rgb(&out))
-    }
 }

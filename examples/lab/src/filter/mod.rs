@@ -10,29 +10,26 @@ mod dump;
 #[cfg(test)]
 mod fixture;
 mod options;
-mod picture;
-#[cfg(test)]
-mod refusals;
 #[cfg(test)]
 mod tests;
 
+use std::io::Cursor;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use crate::Error;
-use indicatif::{ProgressBar, ProgressStyle};
+use image::{ImageFormat, ImageResult, Rgb, Rgb32FImage, RgbImage};
 use subsurface::wgpu::{self, TextureFormat};
 use subsurface::{Frame, Plan};
 
+use crate::Error;
 use crate::method::{self, Ours};
-
 use crate::output;
 use crate::renderer::Gpu;
 use dump::{Camera, Dump};
 use options::Options;
 
-/// The largest half float: between its passes, the planned effect holds light at it.
+/// The largest half float: a plan holds light at it between its passes.
 const LARGEST_HALF: f32 = 65504.0;
 
 pub fn main() -> ExitCode {
@@ -50,47 +47,38 @@ pub fn main() -> ExitCode {
 
 fn filter(options: &Options) -> Result<(), Error> {
     let started = Instant::now();
-    let progress = ProgressBar::new(4).with_style(
-        ProgressStyle::with_template("{bar:24} {msg}").expect("the template is a constant"),
-    );
-    let step = |message: &str| {
-        progress.inc(1);
-        progress.set_message(message.to_owned());
-    };
-
-    step("reading the dump");
     let camera = Camera::read(&options.case)?;
+    let unknown = camera.unknown();
+    if !unknown.is_empty() {
+        note(&format!("gbuffer.json: not read: {}", unknown.join(", ")));
+    }
     let gpu = Gpu::headless()?;
-    gpu.check_size(camera.size).map_err(|e| camera.error(e))?;
+    gpu.check_size(camera.size()).map_err(|e| camera.error(e))?;
     let dump = Dump::read(camera, options.profiles.len())?;
+    if dump.depth_is_half {
+        note(
+            "depth is in half floats, whose steps are up to a thousandth of the distance and show in \
+             the result; write full floats",
+        );
+    }
 
-    step("planning");
     let plan = match options.max_error {
         None => Plan::exact(&options.profiles)?,
-        Some(max_error) => Plan::new(&options.profiles, max_error)?,
+        Some(max_error) => Plan::new(&options.profiles, max_error)
+            .map_err(|e| Error::from(e).within("--max-error"))?,
     };
-
-    step("scattering");
-    let scattered = scatter(&gpu, &dump, &plan)?;
-
-    step("writing");
-    let files = files(options, &dump, &scattered)?;
-    let directory = match options.out.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    };
-    output::write(directory, &files).map_err(|e| {
-        let needs = "a file that can be written";
-        Error::new("--out", format!("\"{e}\""), needs)
-    })?;
-    progress.finish_and_clear();
-    for note in notes(&dump, &plan) {
-        eprintln!("note: {note}");
+    let brightest = dump.brightest();
+    if brightest > LARGEST_HALF && !plan.is_exact() {
+        note(&format!(
+            "irradiance of {brightest} is held at {LARGEST_HALF}; scale it, or use --exact"
+        ));
     }
+    let scattered = scatter(&gpu, &dump, &plan)?;
+    write(options, dump.camera.size(), scattered)?;
     if options.plan {
         print!("{plan}");
     }
-    let [width, height] = dump.camera.size;
+    let [width, height] = dump.camera.size();
     println!(
         "{}: {} of {width}x{height} pixels scattered, depth kept to {:.1e} mm, {:.1} s on {}",
         options.out.display(),
@@ -102,11 +90,26 @@ fn filter(options: &Options) -> Result<(), Error> {
     Ok(())
 }
 
-/// The scattered irradiance; what lay there where nothing scatters.
+/// What is in the way of a good result, but not of a result.
+fn note(text: &str) {
+    eprintln!("note: {}", text.replace(['\n', '\r'], " "));
+}
+
+/// A text, without the byte order mark that PowerShell and others write before it.
+///
+/// # Errors
+/// A file that cannot be read, or is not in UTF-8.
+fn read_text(path: &Path) -> Result<String, Error> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| Error::new(path.display(), format!("\"{e}\""), "a file of UTF-8 text"))?;
+    Ok(text.trim_start_matches('\u{feff}').to_owned())
+}
+
+/// The scattered irradiance; the irradiance as it was where nothing scatters.
 fn scatter(gpu: &Gpu, dump: &Dump, plan: &Plan) -> Result<Vec<[f32; 3]>, Error> {
     // As wide as the files, so that what does not scatter comes out bit for bit.
     let format = TextureFormat::Rgba32Float;
-    let size = dump.camera.size;
+    let size = dump.camera.size();
     let device = &gpu.device;
     // Nothing else tells of a frame that the device has no memory for; what uses a texture that could
     // not be made is then invalid, too.
@@ -116,7 +119,7 @@ fn scatter(gpu: &Gpu, dump: &Dump, plan: &Plan) -> Result<Vec<[f32; 3]>, Error> 
     let irradiance = gpu.upload("irradiance", size, format, &dump.irradiance);
     let depth = gpu.upload("depth", size, TextureFormat::R32Float, &dump.depth);
     let profile_id = gpu.upload("profile id", size, TextureFormat::R8Uint, &dump.profile_id);
-    let projection = dump.camera.projection.to_cols_array_2d();
+    let projection = dump.camera.projection().to_cols_array_2d();
     let mut frame = Frame::new(&irradiance, &depth, projection);
     frame.profile_id = Some(&profile_id);
     frame.mm_per_unit = dump.camera.mm_per_unit;
@@ -135,48 +138,47 @@ fn scatter(gpu: &Gpu, dump: &Dump, plan: &Plan) -> Result<Vec<[f32; 3]>, Error> 
     Ok(texels.iter().map(|&[r, g, b, _]| [r, g, b]).collect())
 }
 
-/// The files asked for, under the names that they get.
-fn files(
-    options: &Options,
-    dump: &Dump,
-    scattered: &[[f32; 3]],
-) -> Result<Vec<(String, Vec<u8>)>, Error> {
-    let size = dump.camera.size;
+/// Writes the files that were asked for, all or none.
+fn write(options: &Options, size: [u32; 2], pixels: Vec<[f32; 3]>) -> Result<(), Error> {
+    let refuse = |error: &dyn std::error::Error| {
+        let got = format!("\"{error}\"");
+        Error::new("--out", got, "a file that can be written")
+    };
     let name = |extension| {
         let path = options.out.with_extension(extension);
         let name = path.file_name().unwrap_or_default();
         name.to_string_lossy().into_owned()
     };
-    let failed = |e: image::ImageError| {
-        Error::new("--out", format!("\"{e}\""), "a picture that can be encoded")
-    };
-    let mut files = vec![(name("exr"), picture::exr(size, scattered).map_err(failed)?)];
+    let mut files = Vec::new();
     if options.png {
-        let picture = picture::tone_mapped(size, scattered);
-        files.push((name("png"), output::png(&picture).map_err(failed)?));
+        let png = output::png(&picture(size, &pixels)).map_err(|e| refuse(&e))?;
+        files.push((name("png"), png));
     }
-    Ok(files)
+    files.push((name("exr"), exr(size, pixels).map_err(|e| refuse(&e))?));
+    let directory = match options.out.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    output::write(directory, &files).map_err(|e| refuse(&e))
 }
 
-/// What is in the way of a good result, but not of a result.
-fn notes(dump: &Dump, plan: &Plan) -> Vec<String> {
-    let mut notes = Vec::new();
-    if dump.depth_is_half {
-        notes.push(
-            "depth is in half floats, whose steps are up to a thousandth of the distance and show \
-             in the result; write floats"
-                .into(),
-        );
-    }
-    let skin = dump.irradiance.iter().zip(&dump.profile_id);
-    let brightest = skin
-        .filter(|(_, id)| **id > 0)
-        .flat_map(|(e, _)| &e[..3])
-        .fold(0.0, |a: f32, b| a.max(*b));
-    if brightest > LARGEST_HALF && !plan.is_exact() {
-        notes.push(format!(
-            "irradiance of {brightest} is held at {LARGEST_HALF}; scale it, or use --exact"
-        ));
-    }
-    notes
+/// Linear pixels, row by row, as an OpenEXR file of full floats.
+fn exr([width, height]: [u32; 2], pixels: Vec<[f32; 3]>) -> ImageResult<Vec<u8>> {
+    let image = Rgb32FImage::from_raw(width, height, pixels.into_flattened())
+        .expect("there is a pixel for each of the frame");
+    let mut file = Cursor::new(Vec::new());
+    image.write_to(&mut file, ImageFormat::OpenExr)?;
+    Ok(file.into_inner())
+}
+
+/// Linear pixels in sRGB (IEC 61966-2-1): below 0 is black, above 1 is white.
+fn picture([width, height]: [u32; 2], pixels: &[[f32; 3]]) -> RgbImage {
+    let srgb = |linear: f32| match linear.clamp(0.0, 1.0) {
+        dark if dark <= 0.003_130_8 => 12.92 * dark,
+        light => 1.055 * light.powf(1.0 / 2.4) - 0.055,
+    };
+    RgbImage::from_fn(width, height, |x, y| {
+        let pixel = pixels[y as usize * width as usize + x as usize];
+        Rgb(pixel.map(|c| (255.0 * srgb(c)).round() as u8))
+    })
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::Error;
+use crate::filter::read_text;
 use subsurface::{DEFAULT_MAX_ERROR, Gaussian, MAX_PROFILES, Profile};
 
 const HELP: &str = "\
@@ -11,12 +12,12 @@ Scatters a frame that another program dumped; docs/dumps.md says how to write on
 Usage: cargo run --release --example filter -- CASE_DIR --out FILE.exr [OPTIONS]
 
   --out FILE.exr        where the scattered irradiance goes
-  --profile NAME        skin, or a diffusion profile in JSON; given again, of the next id  [skin]
+  --profile NAME        skin, or a JSON file; the first is of id 1, the next of id 2       [skin]
   --variance-scale X    multiplies all variances                                           [1]
-  --max-error X         that is accepted, in units of white                                [1/255]
-  --exact               the exact effect, whatever it takes
-  --png                 a tone-mapped picture beside the EXR, too
-  --plan                prints what is done at every scale
+  --max-error X         largest error of the plan, in units of white                       [1/255]
+  --exact               the exact sum instead of a plan
+  --png                 writes a picture beside the EXR, too: sRGB, cut off at 1
+  --plan                prints the plan
 ";
 
 /// What is asked for.
@@ -24,9 +25,9 @@ Usage: cargo run --release --example filter -- CASE_DIR --out FILE.exr [OPTIONS]
 pub struct Options {
     pub case: PathBuf,
     pub out: PathBuf,
-    /// Of the ids, from 1 on.
+    /// Of the ids from 1 on.
     pub profiles: Vec<Profile>,
-    /// None: the exact effect.
+    /// None: the exact sum.
     pub max_error: Option<f32>,
     pub png: bool,
     pub plan: bool,
@@ -41,35 +42,33 @@ impl Options {
             let got = format!("\"{e}\"");
             Error::new("command line", got, "options as --help lists them")
         };
-        let (mut case, mut out) = (None, None);
+        let value = |parser: &mut lexopt::Parser| {
+            let value = parser.value().and_then(|v| v.string());
+            value.map_err(refused)
+        };
+        let (mut case, mut out, mut max_error) = (None, None, None);
         let mut profiles = Vec::new();
         let mut variance_scale = 1.0;
-        let mut max_error = None;
         let (mut exact, mut png, mut plan) = (false, false, false);
         while let Some(arg) = parser.next().map_err(refused)? {
-            let name = match arg {
-                Long(name) => name.to_string(),
-                Short('h') => "help".into(),
-                Value(path) if case.is_none() => {
-                    case = Some(PathBuf::from(path));
-                    continue;
-                }
-                other => return Err(refused(other.unexpected())),
-            };
-            let mut text = || parser.value().and_then(|v| v.string()).map_err(refused);
-            match name.as_str() {
-                "help" => {
+            match arg {
+                Short('h') | Long("help") => {
                     print!("{HELP}");
                     return Ok(None);
                 }
-                "out" => out = Some(exr_path(text()?)?),
-                "profile" => profiles.push(profile(&text()?)?),
-                "variance-scale" => variance_scale = positive("--variance-scale", &text()?)?,
-                "max-error" => max_error = Some(positive("--max-error", &text()?)?),
-                "exact" => exact = true,
-                "png" => png = true,
-                "plan" => plan = true,
-                _ => return Err(refused(Long(name.as_str()).unexpected())),
+                Long("out") => out = Some(exr_path(value(&mut parser)?)?),
+                Long("profile") => profiles.push(profile(&value(&mut parser)?)?),
+                Long("variance-scale") => {
+                    variance_scale = positive("--variance-scale", &value(&mut parser)?)?;
+                }
+                Long("max-error") => {
+                    max_error = Some(positive("--max-error", &value(&mut parser)?)?);
+                }
+                Long("exact") => exact = true,
+                Long("png") => png = true,
+                Long("plan") => plan = true,
+                Value(path) if case.is_none() => case = Some(PathBuf::from(path)),
+                other => return Err(refused(other.unexpected())),
             }
         }
         let missing = |what: &str| {
@@ -77,16 +76,11 @@ impl Options {
             Error::new("command line", format!("no {what}"), needs)
         };
         if exact && max_error.is_some() {
-            let needs = "either; the exact effect asks for no error";
-            return Err(Error::new("--exact", "--max-error, too", needs));
+            return Err(Error::new("--exact", "--max-error, too", "one of the two"));
         }
         if profiles.len() > MAX_PROFILES {
-            let got = format!("{} of them", profiles.len());
-            return Err(Error::new(
-                "--profile",
-                got,
-                format!("at most {MAX_PROFILES}"),
-            ));
+            let needs = format!("at most {MAX_PROFILES}");
+            return Err(Error::new("--profile", profiles.len(), needs));
         }
         if profiles.is_empty() {
             profiles.push(Profile::SKIN);
@@ -124,8 +118,7 @@ fn profile(name: &str) -> Result<Profile, Error> {
     if name == "skin" {
         return Ok(Profile::SKIN);
     }
-    let text = std::fs::read_to_string(name)
-        .map_err(|e| Error::new(name, format!("\"{e}\""), "skin, or a file that can be read"))?;
+    let text = read_text(name.as_ref()).map_err(|e| e.within("--profile"))?;
     Profile::from_json(&text).map_err(|e| Error::from(e).within(name))
 }
 

@@ -5,11 +5,12 @@ use wgpu::{TextureFormat, TextureUsages, TextureView};
 
 use crate::Error;
 
-/// A headless device, at WebGPU's default limits and without any feature: what the effects need
-/// at most.
+/// A headless device, at WebGPU's default limits.
 pub struct Gpu {
     /// The adapter's name and driver.
     pub adapter: String,
+    /// Whether it draws in software.
+    pub is_cpu: bool,
     /// The device.
     pub device: wgpu::Device,
     /// Its queue.
@@ -18,11 +19,20 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// The adapter that wgpu prefers, or the one that `WGPU_ADAPTER_NAME` names a part of.
+    /// The adapter that wgpu prefers, or the one that `WGPU_ADAPTER_NAME` names a part of; without any
+    /// feature, which is what the effects need at most.
     ///
     /// # Errors
     /// No adapter, or one that gives no device.
     pub fn headless() -> Result<Self, Error> {
+        Self::with(wgpu::Features::empty())
+    }
+
+    /// The same with those of these features that the adapter has.
+    ///
+    /// # Errors
+    /// As [`headless`](Self::headless).
+    pub fn with(features: wgpu::Features) -> Result<Self, Error> {
         pollster::block_on(async {
             let no_adapter = |e: &dyn std::fmt::Display| {
                 Error::new(
@@ -47,6 +57,7 @@ impl Gpu {
             let (device, queue) = adapter
                 .request_device(&wgpu::DeviceDescriptor {
                     label: Some("subsurface_lab::Gpu"),
+                    required_features: adapter.features() & features,
                     ..Default::default()
                 })
                 .await
@@ -54,6 +65,7 @@ impl Gpu {
             let info = adapter.get_info();
             Ok(Self {
                 adapter: format!("{} ({:?}, {})", info.name, info.backend, info.driver_info),
+                is_cpu: info.device_type == wgpu::DeviceType::Cpu,
                 to_float: TextureBlitter::new(&device, TextureFormat::Rgba32Float),
                 device,
                 queue,
@@ -148,25 +160,46 @@ impl Gpu {
         let texel = texture.format().block_copy_size(None).unwrap_or(0);
         let row = texture.width() * texel;
         let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let bytes = u64::from(padded) * u64::from(texture.height());
+        let rows = self.read_back(bytes, |encoder, buffer| {
+            encoder.copy_texture_to_buffer(
+                texture.as_image_copy(),
+                wgpu::TexelCopyBufferInfo {
+                    buffer,
+                    layout: wgpu::TexelCopyBufferLayout {
+                        offset: 0,
+                        bytes_per_row: Some(padded),
+                        rows_per_image: None,
+                    },
+                },
+                texture.size(),
+            );
+        });
+        let rows = rows.chunks_exact(padded as usize);
+        rows.flat_map(|r| &r[..row as usize]).copied().collect()
+    }
+
+    /// The first bytes of a buffer.
+    pub(super) fn read_buffer(&self, buffer: &wgpu::Buffer, bytes: u64) -> Vec<u8> {
+        self.read_back(bytes, |encoder, to| {
+            encoder.copy_buffer_to_buffer(buffer, 0, to, 0, bytes)
+        })
+    }
+
+    /// What `copy` records into a buffer of so many bytes.
+    fn read_back(
+        &self,
+        bytes: u64,
+        copy: impl FnOnce(&mut wgpu::CommandEncoder, &wgpu::Buffer),
+    ) -> Vec<u8> {
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("subsurface_lab::Gpu readback"),
-            size: u64::from(padded) * u64::from(texture.height()),
+            size: bytes,
             usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
         let mut encoder = self.device.create_command_encoder(&Default::default());
-        encoder.copy_texture_to_buffer(
-            texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo {
-                buffer: &buffer,
-                layout: wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(padded),
-                    rows_per_image: None,
-                },
-            },
-            texture.size(),
-        );
+        copy(&mut encoder, &buffer);
         self.queue.submit([encoder.finish()]);
         buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
         self.wait();
@@ -174,11 +207,7 @@ impl Gpu {
             .slice(..)
             .get_mapped_range()
             .expect("a readback buffer is mapped once the device has been waited for");
-        bytes
-            .chunks_exact(padded as usize)
-            .flat_map(|r| &r[..row as usize])
-            .copied()
-            .collect()
+        bytes.to_vec()
     }
 
     fn wait(&self) {

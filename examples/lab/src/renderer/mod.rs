@@ -20,13 +20,15 @@ mod probe;
 mod reader;
 mod scene;
 mod tangents;
+mod timestamps;
 
 pub use atlas::AtlasRenderer;
 pub use camera::{Camera, View};
 pub use gpu::Gpu;
 pub use lighting::{Light, Lighting, Sky, Specular};
-pub use probe::Probe;
+pub use probe::{Probe, Visible};
 pub use scene::{Image, Material, Primitive, Scene, Vertex};
+pub use timestamps::Timestamps;
 
 use crate::Error;
 use bytemuck::{Pod, Zeroable};

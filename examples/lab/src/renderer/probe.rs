@@ -13,9 +13,19 @@ const SIDE: u32 = 1024;
 /// Numbers of a place, in fours.
 const LAYERS: u32 = 6;
 
+/// What a pixel shows.
+#[derive(Clone, Copy, Debug)]
+pub struct Visible {
+    /// World position in mm; zero where nothing is.
+    pub point_mm: Vec3,
+    /// The way on the surface, in mm, to where the next pixel in the row and in the column looks.
+    pub steps_mm: [Vec3; 2],
+}
+
 /// Asks a renderer for points and light.
 pub struct Probe {
-    visible: wgpu::RenderPipeline,
+    position: wgpu::RenderPipeline,
+    steps: wgpu::RenderPipeline,
     irradiance: wgpu::RenderPipeline,
     places: wgpu::Texture,
     group: wgpu::BindGroup,
@@ -82,22 +92,24 @@ impl Probe {
                 )),
             }],
         });
-        let visible = super::pipeline(
-            gpu,
-            Pipeline {
-                label,
-                shader: &shader,
-                vertex: "vs_screen",
-                fragment: "fs_visible",
-                groups: &[
-                    Some(&renderer.camera_layout),
-                    Some(&renderer.material_layout),
-                ],
-                targets: &[TextureFormat::Rgba32Float],
-                buffers: &[Mesh::VERTEX_LAYOUT],
-                depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Equal, false)),
-            },
-        );
+        let visible = |fragment, targets: &[TextureFormat]| {
+            super::pipeline(
+                gpu,
+                Pipeline {
+                    label,
+                    shader: &shader,
+                    vertex: "vs_screen",
+                    fragment,
+                    groups: &[
+                        Some(&renderer.camera_layout),
+                        Some(&renderer.material_layout),
+                    ],
+                    targets,
+                    buffers: &[Mesh::VERTEX_LAYOUT],
+                    depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Equal, false)),
+                },
+            )
+        };
         let irradiance = super::pipeline(
             gpu,
             Pipeline {
@@ -117,7 +129,8 @@ impl Probe {
             },
         );
         Self {
-            visible,
+            position: visible("fs_position", &[TextureFormat::Rgba32Float]),
+            steps: visible("fs_steps", &[TextureFormat::Rgba32Float; 2]),
             irradiance,
             places,
             group,
@@ -125,32 +138,50 @@ impl Probe {
         }
     }
 
-    /// World position in mm and area in mm² of what each pixel shows, as `renderer` last drew it;
-    /// zeros where nothing is.
-    pub fn visible(&self, gpu: &Gpu, renderer: &Renderer) -> Vec<[f32; 4]> {
+    /// What each pixel shows, as `renderer` last drew it.
+    pub fn visible(&self, gpu: &Gpu, renderer: &Renderer) -> Vec<Visible> {
         let label = "subsurface_lab::renderer visible";
-        let target = gpu.target(label, renderer.size, TextureFormat::Rgba32Float);
+        let [position, x, y] =
+            [(); 3].map(|()| gpu.target(label, renderer.size, TextureFormat::Rgba32Float));
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
         gpu.run(|encoder| {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some(label),
-                color_attachments: &[Some(super::color_attachment(
-                    &target,
-                    wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                ))],
-                depth_stencil_attachment: Some(super::depth_attachment(
-                    &renderer.gbuffer.depth,
-                    wgpu::LoadOp::Load,
-                )),
-                ..Default::default()
-            });
-            pass.set_pipeline(&self.visible);
-            pass.set_bind_group(0, &renderer.camera_group, &[]);
-            for mesh in &renderer.meshes {
-                pass.set_bind_group(1, &mesh.material, &[]);
-                mesh.draw(&mut pass, 0..mesh.index_count);
+            // Three targets are more bytes a pixel than every device has to allow.
+            for (pipeline, targets) in
+                [(&self.position, &[&position][..]), (&self.steps, &[&x, &y])]
+            {
+                let attachments: Vec<_> = targets
+                    .iter()
+                    .map(|target| Some(super::color_attachment(target, clear)))
+                    .collect();
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some(label),
+                    color_attachments: &attachments,
+                    depth_stencil_attachment: Some(super::depth_attachment(
+                        &renderer.gbuffer.depth,
+                        wgpu::LoadOp::Load,
+                    )),
+                    ..Default::default()
+                });
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &renderer.camera_group, &[]);
+                for mesh in &renderer.meshes {
+                    pass.set_bind_group(1, &mesh.material, &[]);
+                    mesh.draw(&mut pass, 0..mesh.index_count);
+                }
             }
         });
-        gpu.read(&target)
+        let read = |view| {
+            gpu.read(view)
+                .into_iter()
+                .map(|[x, y, z, _]| Vec3::new(x, y, z))
+        };
+        read(&position)
+            .zip(read(&x).zip(read(&y)))
+            .map(|(point_mm, (x, y))| Visible {
+                point_mm,
+                steps_mm: [x, y],
+            })
+            .collect()
     }
 
     /// Irradiance/π at places of the scene's `primitive`, by the lights as `renderer` last drew them.

@@ -5,11 +5,22 @@
 // tangent; texture coordinates; mask; color.
 @group(3) @binding(0) var places: texture_2d_array<f32>;
 
-// Position and area of what a pixel shows, in mm and mm².
+// What a pixel shows: its position, in mm.
 @fragment
-fn fs_visible(in: VertexOut) -> @location(0) vec4f {
+fn fs_position(in: VertexOut) -> @location(0) vec4f {
+    return vec4f(in.world * camera.mm_per_unit, 0.0);
+}
+
+struct Steps {
+    @location(0) x: vec4f,
+    @location(1) y: vec4f,
+}
+
+// And the way on it to where the next pixel in the row, and in the column, looks, in mm.
+@fragment
+fn fs_steps(in: VertexOut) -> Steps {
     let mm = in.world * camera.mm_per_unit;
-    return vec4f(mm, length(cross(dpdx(mm), dpdy(mm))));
+    return Steps(vec4f(dpdx(mm), 0.0), vec4f(dpdy(mm), 0.0));
 }
 
 @vertex

@@ -16,7 +16,7 @@ use subsurface::wgpu::{
 use subsurface::{Frame, Profile};
 
 use super::edge::{distances_mm, minimise, scattered_step, terms, vec3f};
-use super::packed::{PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN};
+use super::packed::{PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN, over_skin};
 use super::pass::{Pass, Slot};
 use crate::method::ScreenMethod;
 
@@ -84,8 +84,8 @@ impl BurleyDisk {
         ]
         .concat();
         Self {
-            packed: Packed::new(device, None),
-            disk: Pass::new(
+            packed: Packed::new(device, format),
+            disk: over_skin(
                 device,
                 "rivals burley_disk",
                 (&shader, "fs_disk"),
@@ -143,8 +143,8 @@ impl ScreenMethod for BurleyDisk {
 
     fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
         if let Some(group) = &self.prepared {
-            self.packed.render(encoder, output);
-            self.disk.draw(encoder, group, &[output]);
+            self.packed.render(encoder);
+            self.packed.finish(encoder, (&self.disk, group), output);
         }
         Ok(())
     }

@@ -83,9 +83,6 @@ fn fs_disk(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let pixel = vec2i(at.xy);
     let before = textureLoad(irradiance, pixel, 0);
     let surface = textureLoad(surfaces, pixel, 0).r;
-    if surface == 0u {
-        return before;
-    }
     let px_per_mm = 1.0 / mm_per_px(surface);
     let reach_px = REACH / WIDEST_PER_MM * px_per_mm;
     if max(reach_px.x, reach_px.y) < 1.0 {

@@ -12,7 +12,8 @@ use subsurface::wgpu::{
     LoadOp, Queue, Sampler, TextureFormat, TextureView,
 };
 
-use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN};
+use super::copy::Copy;
+use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN, over_skin};
 use super::pass::{CLEAR, Pass, Slot, Target, linear_sampler, scratch, size};
 use crate::method::ScreenMethod;
 
@@ -29,6 +30,8 @@ const SKIN: [(f64, DVec3); 4] = [
 /// output as the paper does it: lerped by its weight among those so far.
 pub struct Jimenez2009 {
     packed: Packed,
+    /// What the blurs are blended onto.
+    copy: Copy,
     blurs: Vec<Blur>,
     linear: Sampler,
     scratch: Option<[TextureView; 1]>,
@@ -87,7 +90,7 @@ impl Jimenez2009 {
             let sigma_mm = (variance_mm2 - before_mm2).sqrt();
             before_mm2 = variance_mm2;
             let pass = |entry_point, targets: &[Target]| {
-                Pass::new(
+                over_skin(
                     device,
                     &format!("rivals jimenez_2009 {entry_point}"),
                     (&shader, entry_point),
@@ -108,7 +111,8 @@ impl Jimenez2009 {
             });
         }
         Ok(Self {
-            packed: Packed::new(device, Some(format)),
+            packed: Packed::new(device, format),
+            copy: Copy::new(device, format),
             blurs,
             linear: linear_sampler(device),
             scratch: None,
@@ -118,7 +122,8 @@ impl Jimenez2009 {
 }
 
 impl ScreenMethod for Jimenez2009 {
-    fn prepare(&mut self, device: &Device, _: &Queue, frame: &Frame) -> Result<(), Error> {
+    fn prepare(&mut self, device: &Device, queue: &Queue, frame: &Frame) -> Result<(), Error> {
+        self.copy.prepare(device, queue, frame)?;
         let inputs = self.packed.prepare(device, frame)?;
         let size = size(frame.irradiance);
         let label = "rivals jimenez_2009 rows";
@@ -151,19 +156,22 @@ impl ScreenMethod for Jimenez2009 {
         let (Some([rows]), Some(prepared)) = (&self.scratch, &self.prepared) else {
             return Ok(());
         };
-        self.packed.render(encoder, output);
+        self.packed.render(encoder);
+        self.copy.render(encoder, output)?;
         for (blur, (row_group, column_group)) in self.blurs.iter().zip(&prepared.groups) {
-            blur.rows.draw(encoder, row_group, &[rows]);
+            let targets = [(rows, CLEAR)];
+            self.packed
+                .draw(encoder, (&blur.rows, row_group), &targets, blur.share);
             let targets = [(&prepared.color, CLEAR), (output, LoadOp::Load)];
-            blur.columns
-                .draw_onto(encoder, column_group, &targets, blur.share);
+            self.packed
+                .draw(encoder, (&blur.columns, column_group), &targets, blur.share);
         }
         Ok(())
     }
 
-    /// Seven taps and the surface, six times.
+    /// The copy; seven taps and the surface, six times.
     fn fetches(&self, _px_per_mm: f64) -> Option<f64> {
-        Some(PACKED_FETCHES + 2.0 * 8.0 * self.blurs.len() as f64)
+        Some(1.0 + PACKED_FETCHES + 2.0 * 8.0 * self.blurs.len() as f64)
     }
 
     fn scratch_bytes_per_pixel(&self) -> f64 {

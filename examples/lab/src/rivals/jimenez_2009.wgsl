@@ -22,9 +22,6 @@ fn sigma_px(mm_per_px: f32, gradient_mm: f32) -> f32 {
 fn fs_rows(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let here = surface(at.xy);
     let gradient_mm = dpdx(depth_mm(here));
-    if here == 0u {
-        return vec4f(0.0);
-    }
     return seven_taps(at.xy, vec2f(sigma_px(mm_per_px(here).x, gradient_mm), 0.0));
 }
 
@@ -39,9 +36,6 @@ struct Blurred {
 fn fs_columns(@builtin(position) at: vec4f) -> Blurred {
     let here = surface(at.xy);
     let gradient_mm = dpdy(depth_mm(here));
-    if here == 0u {
-        discard;
-    }
     let blurred = seven_taps(at.xy, vec2f(0.0, sigma_px(mm_per_px(here).y, gradient_mm)));
     return Blurred(blurred, blurred);
 }

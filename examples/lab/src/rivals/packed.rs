@@ -5,32 +5,37 @@ use glam::Vec4;
 use subsurface::Frame;
 use subsurface::wgpu::util::DeviceExt;
 use subsurface::wgpu::{
-    self, BindGroup, Buffer, CommandEncoder, Device, TextureFormat, TextureView,
+    self, BindGroup, Buffer, Color, CommandEncoder, Device, LoadOp, TextureFormat, TextureView,
 };
 
-use super::pass::{Pass, Slot, Target, scratch, size};
+use super::pass::{self, CLEAR, Over, Pass, STENCIL, Slot, TRIANGLE, Target, scratch, size};
 
 /// Color, for which the papers take half floats.
 pub const COLOR: TextureFormat = TextureFormat::Rgba16Float;
 const SURFACE: TextureFormat = TextureFormat::R32Uint;
 
-/// Bytes a pixel.
-pub const PACKED_BYTES: f64 = 8.0 + 4.0;
+/// Bytes a pixel, the stencil's too.
+pub const PACKED_BYTES: f64 = 8.0 + 4.0 + 1.0;
 /// Texels read for a pixel.
 pub const PACKED_FETCHES: f64 = 3.0;
 
 /// The shader text that rivals put theirs behind.
 pub const SCREEN: &str = concat!(include_str!("triangle.wgsl"), include_str!("screen.wgsl"));
 
-/// Color with the mask in alpha, and depth with the id. The papers have linear depth and a stencil
-/// from their G-buffers; here a pass of its own makes them, which spares every tap a division and
-/// a fetch.
+/// Color with the mask in alpha, depth with the id, and a stencil of skin, by which all passes behind draw. The
+/// papers have linear depth and the stencil from their G-buffers; here a pass of its own makes them, which
+/// spares every tap a division and a fetch.
 pub struct Packed {
     pass: Pass,
-    /// Whether the pass writes the irradiance to the output, too.
-    copies: bool,
-    scratch: Option<[TextureView; 2]>,
-    prepared: Option<BindGroup>,
+    /// Light as it was, where there is no skin.
+    rest: Pass,
+    scratch: Option<[TextureView; 3]>,
+    prepared: Option<Prepared>,
+}
+
+struct Prepared {
+    pack: BindGroup,
+    rest: BindGroup,
 }
 
 /// What [`Packed::prepare`] leaves for the passes behind it.
@@ -40,21 +45,40 @@ pub struct Inputs {
     pub surface: TextureView,
 }
 
+/// A pass over skin.
+pub fn over_skin(
+    device: &Device,
+    label: &str,
+    shader: (&str, &str),
+    slots: &[Slot],
+    targets: &[Target],
+    constants: &[(&str, f64)],
+) -> Pass {
+    Pass::over(Over::Skin, device, label, shader, slots, targets, constants)
+}
+
 impl Packed {
-    /// `copy_to` is the output's format where the irradiance is to be written there at once.
-    pub fn new(device: &Device, copy_to: Option<TextureFormat>) -> Self {
-        let mut targets: Vec<Target> = vec![COLOR.into(), SURFACE.into()];
-        targets.extend(copy_to.map(Target::from));
+    /// For outputs of `format`.
+    pub fn new(device: &Device, format: TextureFormat) -> Self {
         Self {
-            pass: Pass::new(
+            pass: Pass::over(
+                Over::Marking,
                 device,
                 "rivals packed",
                 (&[SCREEN, include_str!("packed.wgsl")].concat(), "fs_pack"),
                 &[Slot::Uniform, Slot::Float, Slot::Float, Slot::Uint],
-                &targets,
+                &[COLOR.into(), SURFACE.into()],
                 &[],
             ),
-            copies: copy_to.is_some(),
+            rest: Pass::over(
+                Over::Rest,
+                device,
+                "rivals rest",
+                (&[TRIANGLE, include_str!("copy.wgsl")].concat(), "fs_copy"),
+                &[Slot::Float],
+                &[format.into()],
+                &[],
+            ),
             scratch: None,
             prepared: None,
         }
@@ -79,19 +103,22 @@ impl Packed {
             "rivals packed",
             self.scratch.take(),
             size(frame.irradiance),
-            [COLOR, SURFACE],
+            [COLOR, SURFACE, STENCIL],
         );
-        let group = self.pass.bind(
-            device,
-            &[
-                uniform.as_entire_binding(),
-                wgpu::BindingResource::TextureView(frame.irradiance),
-                wgpu::BindingResource::TextureView(frame.depth),
-                wgpu::BindingResource::TextureView(profile_id),
-            ],
-        );
-        self.prepared = Some(group);
-        let [color, surface] = self.scratch.insert(views).clone();
+        let texture = wgpu::BindingResource::TextureView;
+        self.prepared = Some(Prepared {
+            pack: self.pass.bind(
+                device,
+                &[
+                    uniform.as_entire_binding(),
+                    texture(frame.irradiance),
+                    texture(frame.depth),
+                    texture(profile_id),
+                ],
+            ),
+            rest: self.rest.bind(device, &[texture(frame.irradiance)]),
+        });
+        let [color, surface, _] = self.scratch.insert(views).clone();
         Ok(Inputs {
             frame: uniform,
             color,
@@ -99,14 +126,42 @@ impl Packed {
         })
     }
 
-    /// `output` is where the irradiance goes, if anywhere.
-    pub fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) {
-        if let (Some(group), Some([color, surface])) = (&self.prepared, &self.scratch) {
-            let mut targets = vec![color, surface];
-            if self.copies {
-                targets.push(output);
-            }
-            self.pass.draw(encoder, group, &targets);
+    pub fn render(&self, encoder: &mut CommandEncoder) {
+        if let (Some(prepared), Some([color, surface, stencil])) = (&self.prepared, &self.scratch) {
+            let targets = [(color, CLEAR), (surface, CLEAR)];
+            let draws = [(&self.pass, &prepared.pack)];
+            pass::draw(encoder, &draws, &targets, Some(stencil), Color::BLACK);
+        }
+    }
+
+    /// A pass over skin, to targets each cleared or kept, with the constant that blending uses.
+    pub fn draw(
+        &self,
+        encoder: &mut CommandEncoder,
+        pass: (&Pass, &BindGroup),
+        targets: &[(&TextureView, LoadOp<Color>)],
+        blend_constant: Color,
+    ) {
+        let stencil = self.scratch.as_ref().map(|[.., stencil]| stencil);
+        pass::draw(encoder, &[pass], targets, stencil, blend_constant);
+    }
+
+    /// A method's last pass over skin, and the light as it was elsewhere.
+    pub fn finish(
+        &self,
+        encoder: &mut CommandEncoder,
+        pass: (&Pass, &BindGroup),
+        output: &TextureView,
+    ) {
+        if let (Some(prepared), Some([.., stencil])) = (&self.prepared, &self.scratch) {
+            let draws = [pass, (&self.rest, &prepared.rest)];
+            pass::draw(
+                encoder,
+                &draws,
+                &[(output, CLEAR)],
+                Some(stencil),
+                Color::BLACK,
+            );
         }
     }
 }

@@ -36,17 +36,77 @@ impl From<TextureFormat> for Target {
     }
 }
 
+/// Which pixels a pass draws.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Over {
+    All,
+    /// All, and marks in the stencil what its shader does not discard.
+    Marking,
+    /// What is marked.
+    Skin,
+    /// What is not.
+    Rest,
+}
+
+/// Of the stencil, which the papers have from their G-buffers.
+pub const STENCIL: TextureFormat = TextureFormat::Stencil8;
+/// What marks skin.
+const SKIN: u32 = 1;
+
+impl Over {
+    fn depth_stencil(self) -> Option<wgpu::DepthStencilState> {
+        use wgpu::{CompareFunction, StencilOperation};
+        let (compare, pass_op) = match self {
+            Self::All => return None,
+            Self::Marking => (CompareFunction::Always, StencilOperation::Replace),
+            Self::Skin => (CompareFunction::Equal, StencilOperation::Keep),
+            Self::Rest => (CompareFunction::NotEqual, StencilOperation::Keep),
+        };
+        let face = wgpu::StencilFaceState {
+            compare,
+            pass_op,
+            ..Default::default()
+        };
+        Some(wgpu::DepthStencilState {
+            format: STENCIL,
+            depth_write_enabled: None,
+            depth_compare: None,
+            stencil: wgpu::StencilState {
+                front: face,
+                back: face,
+                read_mask: 0xff,
+                write_mask: 0xff,
+            },
+            bias: Default::default(),
+        })
+    }
+}
+
 /// Draws one triangle over its targets by the fragment shader `entry_point` of a WGSL text that
 /// has a `vs_main`, too.
 pub struct Pass {
     label: String,
+    over: Over,
     layout: BindGroupLayout,
     pipeline: RenderPipeline,
 }
 
 impl Pass {
-    /// `constants` are the values of the text's `override`s.
+    /// Over all pixels. `constants` are the values of the text's `override`s.
     pub fn new(
+        device: &Device,
+        label: &str,
+        shader: (&str, &str),
+        slots: &[Slot],
+        targets: &[Target],
+        constants: &[(&str, f64)],
+    ) -> Self {
+        Self::over(Over::All, device, label, shader, slots, targets, constants)
+    }
+
+    /// Over some, by the stencil that it is drawn with.
+    pub fn over(
+        over: Over,
         device: &Device,
         label: &str,
         (wgsl, entry_point): (&str, &str),
@@ -97,7 +157,7 @@ impl Pass {
                 buffers: &[],
             },
             primitive: Default::default(),
-            depth_stencil: None,
+            depth_stencil: over.depth_stencil(),
             multisample: Default::default(),
             fragment: Some(wgpu::FragmentState {
                 module: &module,
@@ -113,6 +173,7 @@ impl Pass {
         });
         Self {
             label: label.into(),
+            over,
             layout,
             pipeline,
         }
@@ -135,42 +196,56 @@ impl Pass {
         })
     }
 
-    /// Draws over all of targets that need not hold anything yet.
+    /// Draws over targets that need not hold anything yet.
     pub fn draw(&self, encoder: &mut CommandEncoder, group: &BindGroup, targets: &[&TextureView]) {
         let targets: Vec<_> = targets.iter().map(|&view| (view, CLEAR)).collect();
-        self.draw_onto(encoder, group, &targets, Color::BLACK);
+        draw(encoder, &[(self, group)], &targets, None, Color::BLACK);
     }
+}
 
-    /// Draws over targets, each cleared or kept, with the constant that blending uses.
-    pub fn draw_onto(
-        &self,
-        encoder: &mut CommandEncoder,
-        group: &BindGroup,
-        targets: &[(&TextureView, LoadOp<Color>)],
-        blend_constant: Color,
-    ) {
-        let attachments: Vec<_> = targets
-            .iter()
-            .map(|&(view, load)| {
-                Some(wgpu::RenderPassColorAttachment {
-                    view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load,
-                        store: wgpu::StoreOp::Store,
-                    },
-                })
+/// Draws passes one after the other over the same targets, each cleared or kept, by a stencil where they need
+/// one, and with the constant that blending uses.
+pub fn draw(
+    encoder: &mut CommandEncoder,
+    draws: &[(&Pass, &BindGroup)],
+    targets: &[(&TextureView, LoadOp<Color>)],
+    stencil: Option<&TextureView>,
+    blend_constant: Color,
+) {
+    let attachments: Vec<_> = targets
+        .iter()
+        .map(|&(view, load)| {
+            Some(wgpu::RenderPassColorAttachment {
+                view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load,
+                    store: wgpu::StoreOp::Store,
+                },
             })
-            .collect();
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some(&self.label),
-            color_attachments: &attachments,
-            ..Default::default()
-        });
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, group, &[]);
-        pass.set_blend_constant(blend_constant);
+        })
+        .collect();
+    // Read only, but where it is marked.
+    let marks = draws.iter().any(|(pass, _)| pass.over == Over::Marking);
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: draws.first().map(|(pass, _)| pass.label.as_str()),
+        color_attachments: &attachments,
+        depth_stencil_attachment: stencil.map(|view| wgpu::RenderPassDepthStencilAttachment {
+            view,
+            depth_ops: None,
+            stencil_ops: marks.then_some(wgpu::Operations {
+                load: LoadOp::Clear(0),
+                store: wgpu::StoreOp::Store,
+            }),
+        }),
+        ..Default::default()
+    });
+    pass.set_blend_constant(blend_constant);
+    pass.set_stencil_reference(SKIN);
+    for (drawn, group) in draws {
+        pass.set_pipeline(&drawn.pipeline);
+        pass.set_bind_group(0, *group, &[]);
         pass.draw(0..3, 0..1);
     }
 }

@@ -9,13 +9,14 @@ use std::fmt::Write;
 use crate::Error;
 use glam::DVec3;
 use subsurface::wgpu::{
-    BindGroup, BindingResource, CommandEncoder, Device, Queue, Sampler, TextureFormat, TextureView,
+    BindGroup, BindingResource, Color, CommandEncoder, Device, Queue, Sampler, TextureFormat,
+    TextureView,
 };
 use subsurface::{Frame, Profile};
 
 use super::edge::{Responses, minimise, step, terms, vec3f};
-use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN};
-use super::pass::{Pass, Slot, linear_sampler, scratch, size};
+use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN, over_skin};
+use super::pass::{CLEAR, Pass, Slot, linear_sampler, scratch, size};
 use crate::method::ScreenMethod;
 
 /// Depth difference, as a multiple of the kernel's width, from which a tap takes the center's
@@ -218,10 +219,10 @@ impl Separable {
         let pass = |entry_point, target: TextureFormat| {
             let label = format!("rivals separable {entry_point}");
             let shader = (shader.as_str(), entry_point);
-            Pass::new(device, &label, shader, &slots, &[target.into()], &[])
+            over_skin(device, &label, shader, &slots, &[target.into()], &[])
         };
         Self {
-            packed: Packed::new(device, None),
+            packed: Packed::new(device, format),
             rows: pass("fs_rows", COLOR),
             columns: pass("fs_columns", format),
             linear: linear_sampler(device),
@@ -279,9 +280,12 @@ impl ScreenMethod for Separable {
 
     fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
         if let (Some([rows]), Some((row_group, column_group))) = (&self.scratch, &self.prepared) {
-            self.packed.render(encoder, output);
-            self.rows.draw(encoder, row_group, &[rows]);
-            self.columns.draw(encoder, column_group, &[output]);
+            self.packed.render(encoder);
+            let targets = [(rows, CLEAR)];
+            self.packed
+                .draw(encoder, (&self.rows, row_group), &targets, Color::BLACK);
+            self.packed
+                .finish(encoder, (&self.columns, column_group), output);
         }
         Ok(())
     }

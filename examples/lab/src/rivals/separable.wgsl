@@ -43,9 +43,6 @@ fn blur(at: vec2f, surface: u32, axis: vec2f) -> vec3f {
 @fragment
 fn fs_rows(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let surface = textureLoad(surfaces, vec2i(at.xy), 0).r;
-    if surface == 0u {
-        return vec4f(0.0);
-    }
     return vec4f(blur(at.xy, surface, vec2f(1.0, 0.0)), 1.0);
 }
 
@@ -53,9 +50,6 @@ fn fs_rows(@builtin(position) at: vec4f) -> @location(0) vec4f {
 fn fs_columns(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let before = textureLoad(irradiance, vec2i(at.xy), 0);
     let surface = textureLoad(surfaces, vec2i(at.xy), 0).r;
-    if surface == 0u {
-        return before;
-    }
     return vec4f(blur(at.xy, surface, vec2f(0.0, 1.0)), before.a);
 }
 

@@ -3,99 +3,91 @@
 use std::fmt;
 use std::time::Duration;
 
-use crate::Error;
 use glam::Vec3;
 
+use crate::Error;
 use crate::stability::lab::Lab;
 
 /// The methods, in the order of the table's columns.
 pub const METHODS: [&str; 9] = [
     "none",
-    "screen_exact",
-    "screen_planned",
-    "texture_separable",
+    EXACT,
+    PLAN,
+    ATLAS,
     "jimenez_2009",
     "jimenez_separable",
     "fitted_separable",
     "burley_disk",
     "texture_cascade",
 ];
-
+/// Ours: the exact sum, a plan, and texture space.
+pub const EXACT: &str = "screen_exact";
+pub const PLAN: &str = "screen_planned";
+pub const ATLAS: &str = "texture_separable";
+pub const OURS: [&str; 3] = [EXACT, PLAN, ATLAS];
 /// Whose figure it is where a file is read, before any method runs.
 pub const INPUT: &str = "input";
 
-/// Those of this crate.
-pub const OURS: [&str; 3] = ["screen_exact", "screen_planned", "texture_separable"];
+/// What cases are about, in the order of the page.
+pub const GROUPS: [&str; 8] = [
+    "screen space",
+    "ids and pixels",
+    "texture space",
+    "time",
+    "numbers",
+    "sizes",
+    "hosts",
+    "files",
+];
 
-/// What a case is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Group {
-    Screen,
-    Texture,
-    Time,
-    Numbers,
-    Hosts,
-    Files,
-}
-
-impl Group {
-    pub const ALL: [Self; 6] = [
-        Self::Screen,
-        Self::Texture,
-        Self::Time,
-        Self::Numbers,
-        Self::Hosts,
-        Self::Files,
-    ];
-
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Screen => "screen space",
-            Self::Texture => "texture space",
-            Self::Time => "time",
-            Self::Numbers => "numbers",
-            Self::Hosts => "hosts",
-            Self::Files => "files",
-        }
-    }
-}
+/// A figure for each method; methods that a case does not apply to are left out.
+pub type Figures = Vec<(&'static str, f64)>;
+/// Linear light by each method, pixel by pixel.
+pub type Results = Vec<(&'static str, Vec<Vec3>)>;
 
 /// One thing that may go wrong.
 pub struct Case {
-    pub group: Group,
+    /// One of [`GROUPS`].
+    pub group: &'static str,
     /// Few words: a row of the table.
     pub name: String,
     /// The scene, and what the figure is of it.
     pub what: String,
-    /// At this figure or less a method passes ...
-    pub passes: f64,
-    /// ... at this or less it is degraded, and beyond it fails.
-    pub degrades: f64,
-    /// Why there.
-    pub why: String,
+    pub bound: Bound,
     /// Where ours does not pass.
     pub known: Vec<Known>,
+    /// Whether its picture shows what no other does.
+    pub is_pictured: bool,
     pub run: Run,
 }
 
-pub type Run = Box<dyn Fn(&Lab) -> Result<Outcome, Error>>;
+type Run = Box<dyn Fn(&Lab) -> Result<Outcome, Error>>;
 
-/// A mode of ours that does not pass.
+/// At `passes` or less a method passes, at `degrades` or less it is degraded, beyond it fails.
+#[derive(Clone, Copy, PartialEq)]
+pub struct Bound {
+    pub passes: f64,
+    pub degrades: f64,
+    /// Why there.
+    pub why: &'static str,
+}
+
+/// A method of ours that does not pass.
+#[derive(Clone, Copy)]
 pub struct Known {
     pub method: &'static str,
-    /// The figure must not become worse than this; infinite where it may even be no number.
+    /// The figure must not become worse than this; infinite where it may even be NaN.
     pub at_most: f64,
-    /// Whether no method could that knows no more than it does.
+    /// Whether no method could pass that has the same inputs.
     pub by_nature: bool,
     /// Why, and what to use instead.
-    pub why: String,
+    pub why: &'static str,
 }
 
 /// What came out of a case.
 #[derive(Default)]
 pub struct Outcome {
-    /// A method and its figure; methods that it does not apply to are left out.
-    pub figures: Vec<(&'static str, f64)>,
+    pub figures: Figures,
     /// What the picture shows.
     pub shown: Option<Shown>,
 }
@@ -103,10 +95,8 @@ pub struct Outcome {
 /// A part of a frame, by every method.
 pub struct Shown {
     pub size: [u32; 2],
-    /// Linear irradiance, as all of these.
     pub truth: Vec<Vec3>,
-    /// A method and its result.
-    pub results: Vec<(&'static str, Vec<Vec3>)>,
+    pub results: Results,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,15 +114,46 @@ pub struct Judged {
 }
 
 impl Case {
+    /// With nothing known to fail; [`all`](super::cases::all) says of which group it is.
+    pub fn new(
+        name: impl Into<String>,
+        what: impl Into<String>,
+        bound: Bound,
+        run: impl Fn(&Lab) -> Result<Outcome, Error> + 'static,
+    ) -> Self {
+        Self {
+            group: "",
+            name: name.into(),
+            what: what.into(),
+            bound,
+            known: vec![],
+            is_pictured: true,
+            run: Box::new(run),
+        }
+    }
+
+    pub fn known(mut self, known: impl IntoIterator<Item = Known>) -> Self {
+        self.known.extend(known);
+        self
+    }
+
+    /// Whether it has a picture; not where that would show the same as others do.
+    pub fn pictured(self, is_pictured: bool) -> Self {
+        Self {
+            is_pictured,
+            ..self
+        }
+    }
+
     pub fn title(&self) -> String {
-        format!("{}: {}", self.group.title(), self.name)
+        format!("{}: {}", self.group, self.name)
     }
 
     pub fn verdict(&self, figure: f64) -> Verdict {
-        // What is no number is not at most anything.
-        if figure <= self.passes {
+        // NaN is not at most anything.
+        if figure <= self.bound.passes {
             Verdict::Passes
-        } else if figure <= self.degrades {
+        } else if figure <= self.bound.degrades {
             Verdict::Degraded
         } else {
             Verdict::Fails
@@ -140,15 +161,34 @@ impl Case {
     }
 }
 
-impl Judged {
-    pub fn new(case: Case, outcome: Outcome, took: Duration) -> Self {
+/// A method of ours that does not pass, though another could.
+pub fn known(method: &'static str, at_most: f64, why: &'static str) -> Known {
+    Known {
+        method,
+        at_most,
+        by_nature: false,
+        why,
+    }
+}
+
+/// A method of ours that cannot pass with the inputs that it has.
+pub fn by_nature(method: &'static str, at_most: f64, why: &'static str) -> Known {
+    Known {
+        by_nature: true,
+        ..known(method, at_most, why)
+    }
+}
+
+impl From<Figures> for Outcome {
+    fn from(figures: Figures) -> Self {
         Self {
-            case,
-            outcome,
-            took,
+            figures,
+            shown: None,
         }
     }
+}
 
+impl Judged {
     /// A method's figure.
     pub fn figure(&self, method: &str) -> Option<f64> {
         let figures = &self.outcome.figures;
@@ -163,40 +203,40 @@ impl Judged {
         })
     }
 
-    /// Modes of ours that are worse than they are known to be, or that are known and have no figure.
+    /// Methods of ours that are worse than they are known to be, or that are known and have no figure.
     pub fn worse(&self) -> Vec<String> {
-        let ours = OURS
+        let title = self.case.title();
+        let missing = self
+            .case
+            .known
             .iter()
-            .chain(&[INPUT])
-            .filter_map(|m| self.figure(m).map(|figure| (m, figure)));
-        let missing = self.case.known.iter().map(|known| known.method);
-        let missing = missing.filter(|method| self.figure(method).is_none());
-        let missing = missing.map(|m| format!("{}: {m} has no figure", self.case.title()));
-        ours.filter_map(|(method, figure)| {
-            let known = self.case.known.iter().find(|k| k.method == *method);
-            let at_most = known.map_or(self.case.passes, |k| k.at_most);
+            .filter(|k| self.figure(k.method).is_none());
+        let missing = missing.map(|k| format!("{title}: {} has no figure", k.method));
+        let ours = OURS.into_iter().chain([INPUT]);
+        let worse = ours.filter_map(|method| {
+            let figure = self.figure(method)?;
+            let known = self.case.known.iter().find(|k| k.method == method);
+            let at_most = known.map_or(self.case.bound.passes, |k| k.at_most);
             let holds = figure <= at_most || at_most == f64::INFINITY;
-            (!holds).then(|| {
-                let title = self.case.title();
-                format!(
-                    "{title}: {method} is at {}, not at most {at_most}",
-                    short(figure)
-                )
-            })
-        })
-        .chain(missing)
-        .collect()
+            (!holds)
+                .then(|| format!("{title}: {method} is at {figure:.5}, needs {at_most:.5} or less"))
+        });
+        worse.chain(missing).collect()
     }
 
-    /// Whether a rival fails where all of ours pass.
-    pub fn rivals_fail_alone(&self) -> bool {
+    /// What a picture is worth: where verdicts differ, or ours do not pass.
+    pub fn is_shown(&self) -> bool {
         let verdicts = |ours: bool| {
             let figures = self.outcome.figures.iter();
             figures
                 .filter(move |(m, _)| OURS.contains(m) == ours && !["none", INPUT].contains(m))
                 .map(|(_, f)| self.case.verdict(*f))
         };
-        verdicts(true).all(|v| v == Verdict::Passes) && verdicts(false).any(|v| v == Verdict::Fails)
+        let rivals_fail_alone = verdicts(true).all(|v| v == Verdict::Passes)
+            && verdicts(false).any(|v| v == Verdict::Fails);
+        self.case.is_pictured
+            && self.outcome.shown.is_some()
+            && (rivals_fail_alone || self.shortcomings().next().is_some())
     }
 }
 
@@ -206,11 +246,9 @@ pub fn short(figure: f64) -> String {
         _ if !figure.is_finite() => format!("{figure}"),
         0.0 => "0".into(),
         f if !(1e-4..1e4).contains(&f) => format!("{figure:.0e}"),
-        f if f >= 10.0 => format!("{figure:.0}"),
         f => {
             let places = (1 - f.log10().floor() as i32).max(0) as usize;
-            let text = format!("{figure:.places$}");
-            text.strip_prefix('0').map(String::from).unwrap_or(text)
+            format!("{figure:.places$}")
         }
     }
 }

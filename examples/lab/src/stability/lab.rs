@@ -3,15 +3,16 @@
 use std::cell::RefCell;
 use std::sync::{Arc, Mutex};
 
-use crate::Error;
 use glam::Vec3;
-use subsurface::wgpu::{TextureFormat, TextureView};
+use subsurface::wgpu::{CommandEncoder, TextureFormat, TextureView};
 use subsurface::{Atlas, DEFAULT_MAX_ERROR, Frame, Plan, Profile, TextureSpace};
 
+use crate::Error;
 use crate::method::{self, AtlasMethod, Ours, ScreenMethod};
 use crate::renderer::Gpu;
 use crate::rivals;
-use crate::stability::case::METHODS;
+use crate::stability::case::{ATLAS, EXACT, PLAN, Results};
+use crate::stability::inputs::Uploaded;
 
 /// What results are written as, and what most hosts have.
 pub const OUTPUT: TextureFormat = TextureFormat::Rgba16Float;
@@ -25,17 +26,51 @@ const SETTINGS: [(&str, &str); 5] = [
     ("texture_cascade", ""),
 ];
 
-pub type Screen = (&'static str, Box<dyn ScreenMethod>);
-pub type Texture = (&'static str, Box<dyn AtlasMethod>);
+/// A method of either space.
+pub enum Method {
+    Screen(Box<dyn ScreenMethod>),
+    Texture(Box<dyn AtlasMethod>),
+}
+
+pub type Methods = Vec<(&'static str, Method)>;
+
+impl Method {
+    /// # Errors
+    /// Inputs that it refuses.
+    pub fn prepare(&mut self, gpu: &Gpu, inputs: &Uploaded) -> Result<(), Error> {
+        let (device, queue) = (&gpu.device, &gpu.queue);
+        match self {
+            Self::Screen(method) => method.prepare(device, queue, &inputs.frame()),
+            Self::Texture(method) => method.prepare(device, queue, &inputs.atlas()),
+        }
+    }
+
+    /// # Errors
+    /// An output that it refuses.
+    pub fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
+        match self {
+            Self::Screen(method) => method.render(encoder, output),
+            Self::Texture(method) => method.render(encoder, output),
+        }
+    }
+
+    /// What it makes of these inputs, alpha included.
+    ///
+    /// # Errors
+    /// Inputs that it refuses.
+    pub fn scatter(&mut self, gpu: &Gpu, inputs: &Uploaded) -> Result<Vec<[f32; 4]>, Error> {
+        self.prepare(gpu, inputs)?;
+        gpu.run(|encoder| self.render(encoder, &inputs.output))?;
+        Ok(gpu.read(&inputs.output))
+    }
+}
 
 /// What stays the same from case to case.
 pub struct Lab {
     pub gpu: Gpu,
     /// Of the skin profile, at the default error.
     pub plan: Plan,
-    screen: RefCell<Vec<Screen>>,
-    /// Over one atlas at a time, [`scatter_atlas`](Self::scatter_atlas).
-    pub texture: RefCell<Vec<Texture>>,
+    methods: RefCell<Methods>,
     /// What the device complained of.
     complaints: Arc<Mutex<Vec<String>>>,
 }
@@ -53,48 +88,66 @@ impl Lab {
             }
         }));
         let plan = Plan::new(&[Profile::SKIN], DEFAULT_MAX_ERROR)?;
-        let screen = screen_methods(&gpu, &Profile::SKIN, &plan)?;
-        let texture = texture_methods(&gpu, &Profile::SKIN)?;
         Ok(Self {
-            screen: RefCell::new(screen),
-            texture: RefCell::new(texture),
+            methods: RefCell::new(methods(&gpu, &plan)?),
             gpu,
             plan,
             complaints,
         })
     }
 
-    /// What every method in screen space makes of a frame of skin; the first is that which does nothing.
+    /// What every method in screen space makes of a frame of skin; the first does nothing.
     ///
     /// # Errors
     /// A frame that a method refuses.
-    pub fn scatter(
-        &self,
-        frame: &Frame,
-        output: &TextureView,
-    ) -> Result<Vec<(&'static str, Vec<Vec3>)>, Error> {
+    pub fn scatter(&self, frame: &Frame, output: &TextureView) -> Result<Results, Error> {
         let mut results = vec![("none", self.read(frame.irradiance))];
-        for (name, method) in self.screen.borrow_mut().iter_mut() {
-            method::scatter(&self.gpu, &mut **method, frame, output)?;
-            results.push((*name, self.read(output)));
+        for (name, method) in self.methods.borrow_mut().iter_mut() {
+            if let Method::Screen(method) = method {
+                method::scatter(&self.gpu, &mut **method, frame, output)?;
+                results.push((*name, self.read(output)));
+            }
         }
         Ok(results)
+    }
+
+    /// Hands `visit` every method in texture space.
+    ///
+    /// # Errors
+    /// What `visit` fails with.
+    pub fn by_atlas(
+        &self,
+        mut visit: impl FnMut(&'static str, &mut dyn AtlasMethod) -> Result<(), Error>,
+    ) -> Result<(), Error> {
+        for (name, method) in self.methods.borrow_mut().iter_mut() {
+            if let Method::Texture(method) = method {
+                visit(name, &mut **method)?;
+            }
+        }
+        Ok(())
     }
 
     /// What every method in texture space makes of an atlas of skin.
     ///
     /// # Errors
     /// An atlas that a method refuses.
-    pub fn scatter_atlas(
-        &self,
-        atlas: &Atlas,
-        output: &TextureView,
-    ) -> Result<Vec<(&'static str, Vec<Vec3>)>, Error> {
+    pub fn scatter_atlas(&self, atlas: &Atlas, output: &TextureView) -> Result<Results, Error> {
         let mut results = Vec::new();
-        for (name, method) in self.texture.borrow_mut().iter_mut() {
-            method::scatter_atlas(&self.gpu, &mut **method, atlas, output)?;
-            results.push((*name, self.read(output)));
-        }
+        self.by_atlas(|name, method| {
+            method::scatter_atlas(&self.gpu, method, atlas, output)?;
+            results.push((name, self.read(output)));
+            Ok(())
+        })?;
+        Ok(results)
+    }
+
+    /// What all methods make of a frame, and of an atlas whose texels are its pixels.
+    ///
+    /// # Errors
+    /// Inputs that a method refuses.
+    pub fn scatter_both(&self, inputs: &Uploaded) -> Result<Results, Error> {
+        let mut results = self.scatter(&inputs.frame(), &inputs.output)?;
+        results.extend(self.scatter_atlas(&inputs.atlas(), &inputs.output)?);
         Ok(results)
     }
 
@@ -110,44 +163,41 @@ impl Lab {
     pub fn check(&self, case: &str) -> Result<(), Error> {
         let mut heard = self.complaints.lock().unwrap_or_else(|e| e.into_inner());
         match heard.drain(..).next() {
-            Some(first) => Err(Error::new(case, first, "a device that has nothing to say")),
+            Some(first) => Err(Error::new(case, first, "a device without complaints")),
             None => Ok(()),
         }
     }
 }
 
-/// Every method in screen space, for a profile and its plan.
+/// Ours alone, new.
 ///
 /// # Errors
-/// A device that a method refuses.
-pub fn screen_methods(gpu: &Gpu, profile: &Profile, plan: &Plan) -> Result<Vec<Screen>, Error> {
-    let device = &gpu.device;
-    let exact = Plan::exact(&[*profile])?;
-    let exact = Ours::new(device, OUTPUT, &exact)?;
-    let planned = Ours::new(device, OUTPUT, plan)?;
-    let mut methods: Vec<Screen> = vec![
-        ("screen_exact", Box::new(exact)),
-        ("screen_planned", Box::new(planned)),
-    ];
-    for (name, setting, method) in rivals::screen(device, OUTPUT, profile)? {
-        if SETTINGS.contains(&(name, setting.as_str())) {
-            methods.push((name, method));
-        }
-    }
-    methods.sort_by_key(|(name, _)| METHODS.iter().position(|m| m == name));
-    Ok(methods)
+/// A device that one of them refuses.
+pub fn ours(gpu: &Gpu, plan: &Plan) -> Result<Methods, Error> {
+    let screen = |plan| Ours::new(&gpu.device, OUTPUT, plan).map(|m| Method::Screen(Box::new(m)));
+    let atlas = TextureSpace::new(&gpu.device, OUTPUT, plan.profiles())?;
+    Ok(vec![
+        (EXACT, screen(&Plan::exact(plan.profiles())?)?),
+        (PLAN, screen(plan)?),
+        (ATLAS, Method::Texture(Box::new(atlas))),
+    ])
 }
 
-/// Every method in texture space, for a profile.
+/// Ours and all rivals, new, for the plan's first profile.
 ///
 /// # Errors
 /// A device that a method refuses.
-pub fn texture_methods(gpu: &Gpu, profile: &Profile) -> Result<Vec<Texture>, Error> {
-    let ours = TextureSpace::new(&gpu.device, OUTPUT, &[*profile])?;
-    let mut methods: Vec<Texture> = vec![("texture_separable", Box::new(ours))];
+pub fn methods(gpu: &Gpu, plan: &Plan) -> Result<Methods, Error> {
+    let profile = &plan.profiles()[0];
+    let mut methods = ours(gpu, plan)?;
+    for (name, setting, method) in rivals::screen(&gpu.device, OUTPUT, profile)? {
+        if SETTINGS.contains(&(name, setting.as_str())) {
+            methods.push((name, Method::Screen(method)));
+        }
+    }
     for (name, setting, method) in rivals::atlas(&gpu.device, OUTPUT, profile) {
         if SETTINGS.contains(&(name, setting.as_str())) {
-            methods.push((name, method));
+            methods.push((name, Method::Texture(method)));
         }
     }
     Ok(methods)

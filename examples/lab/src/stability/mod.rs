@@ -7,81 +7,79 @@
 
 mod case;
 mod cases;
-mod frame;
+mod inputs;
 mod lab;
 mod options;
 mod report;
+mod scene;
 mod strip;
-mod table;
+mod track;
+mod trial;
 mod unwrapped;
 
 use std::process::ExitCode;
 use std::time::Instant;
 
 use crate::Error;
-use indicatif::{ProgressBar, ProgressStyle};
-
-use case::{Case, Judged};
+use case::{Case, GROUPS, Judged};
+pub use cases::sizes;
 use lab::Lab;
 use options::Options;
 use report::Report;
 
 pub fn main() -> ExitCode {
     let outcome = Options::parse().and_then(|options| options.map_or(Ok(vec![]), |o| atlas(&o)));
-    match outcome {
-        Ok(worse) if worse.is_empty() => ExitCode::SUCCESS,
-        Ok(worse) => {
-            for line in worse {
-                eprintln!("error: {line}");
-            }
-            ExitCode::FAILURE
-        }
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
+    let errors = outcome.unwrap_or_else(|error| vec![error.to_string()]);
+    for error in &errors {
+        eprintln!("error: {error}");
+    }
+    if errors.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
     }
 }
 
 /// Runs the cases and writes what came out; what is worse than it is known to be, a line each.
 fn atlas(options: &Options) -> Result<Vec<String>, Error> {
     let started = Instant::now();
-    let cases: Vec<Case> = cases::all(options.quick)
-        .into_iter()
-        .filter(|case| options.wants(&case.title()))
-        .collect();
+    let mut cases = cases::all(options.quick);
+    cases.retain(|case| options.wants(&case.title()));
     if cases.is_empty() {
         let got = options.only.clone().unwrap_or_default();
         return Err(Error::new("--only", got, "a part of a case's name"));
     }
     let lab = Lab::new()?;
-    let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {msg}");
-    let bar =
-        ProgressBar::new(cases.len() as u64).with_style(style.expect("the template is a constant"));
-    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+    let count = cases.len();
     let mut judged: Vec<Judged> = Vec::new();
     for case in cases {
-        bar.set_message(case.title());
-        let since = Instant::now();
-        let outcome = (case.run)(&lab)?;
-        lab.check(&case.title())?;
-        let judgement = Judged::new(case, outcome, since.elapsed());
-        bar.suspend(|| println!("{judgement}"));
-        bar.inc(1);
-        judged.push(judgement);
+        judged.push(judge(case, &lab)?);
+        println!("{}/{count} {}", judged.len(), judged[judged.len() - 1]);
     }
-    bar.finish_and_clear();
+    judged.sort_by_key(|j| GROUPS.iter().position(|group| *group == j.case.group));
     let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
-    Report {
+    let report = Report {
         judged: &judged,
         adapter: &lab.gpu.adapter,
         command: &command,
-    }
-    .write(&options.out)?;
+    };
+    report.write(&options.out)?;
+    let page = options.out.join("failures.md");
     println!(
         "{} in {:.0} s",
-        options.out.join("failures.md").display(),
+        page.display(),
         started.elapsed().as_secs_f64()
     );
     Ok(judged.iter().flat_map(Judged::worse).collect())
+}
+
+fn judge(case: Case, lab: &Lab) -> Result<Judged, Error> {
+    let since = Instant::now();
+    let outcome = (case.run)(lab).map_err(|error| error.within(case.title()))?;
+    lab.check(&case.title())?;
+    Ok(Judged {
+        case,
+        outcome,
+        took: since.elapsed(),
+    })
 }

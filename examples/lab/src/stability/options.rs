@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use crate::Error;
 
 const HELP: &str = "\
-Tries every method where methods fail, and writes what came out: failures.md, a table as SVG and PNG,
-and pictures.
+Tries every method where methods fail, and writes what came out: failures.md and pictures.
 
 Usage: cargo run --release --example stability -- [OPTIONS]
 
@@ -38,6 +37,8 @@ impl Options {
             let got = format!("\"{e}\"");
             Error::new("command line", got, "options as --help lists them")
         };
+        let text =
+            |parser: &mut lexopt::Parser| parser.value().and_then(|v| v.string()).map_err(refused);
         let mut parser = lexopt::Parser::from_env();
         while let Some(arg) = parser.next().map_err(refused)? {
             match arg {
@@ -46,8 +47,8 @@ impl Options {
                     return Ok(None);
                 }
                 Long("quick") => options.quick = true,
-                Long("only") => options.only = Some(text(&mut parser).map_err(refused)?),
-                Long("out") => options.out = text(&mut parser).map_err(refused)?.into(),
+                Long("only") => options.only = Some(text(&mut parser)?),
+                Long("out") => options.out = text(&mut parser)?.into(),
                 other => return Err(refused(other.unexpected())),
             }
         }
@@ -57,9 +58,4 @@ impl Options {
     pub fn wants(&self, title: &str) -> bool {
         self.only.as_ref().is_none_or(|part| title.contains(part))
     }
-}
-
-fn text(parser: &mut lexopt::Parser) -> Result<String, lexopt::Error> {
-    use lexopt::ValueExt as _;
-    parser.value()?.string()
 }

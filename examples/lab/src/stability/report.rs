@@ -3,13 +3,12 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::Error;
 use image::codecs::jpeg::JpegEncoder;
 
+use crate::Error;
 use crate::output;
-use crate::stability::case::{Case, Group, INPUT, Judged, METHODS, Verdict, short};
+use crate::stability::case::{GROUPS, INPUT, Judged, METHODS, Verdict, short};
 use crate::stability::strip::strip;
-use crate::stability::table::table;
 use crate::svg::Rasteriser;
 
 pub struct Report<'a> {
@@ -25,59 +24,33 @@ impl Report<'_> {
     /// # Errors
     /// A picture that cannot be made, a directory that cannot be written to.
     pub fn write(&self, out: &Path) -> Result<(), Error> {
-        let failed = |e: &dyn std::fmt::Display| {
-            Error::new("the atlas", format!("\"{e}\""), "files that can be made")
-        };
         let rasteriser = Rasteriser::new();
-        let drawing = table(self.judged, &self.caption());
-        let drawn = rasteriser.picture(&drawing).map_err(|e| failed(&e))?;
-        let mut images = vec![
-            ("failures.svg".to_owned(), drawing.into_bytes()),
-            (
-                "failures.png".to_owned(),
-                output::png(&drawn).map_err(|e| failed(&e))?,
-            ),
-        ];
-        for judged in self.judged.iter().filter(|j| is_shown(j)) {
+        let mut images = Vec::new();
+        for judged in self.judged.iter().filter(|j| j.is_shown()) {
             if let Some(picture) = strip(judged, &rasteriser)? {
                 let mut jpeg = Vec::new();
-                JpegEncoder::new_with_quality(&mut jpeg, 85)
-                    .encode_image(&picture)
-                    .map_err(|e| failed(&e))?;
+                let made = JpegEncoder::new_with_quality(&mut jpeg, 80).encode_image(&picture);
+                made.map_err(|e| {
+                    Error::new(picture_name(judged), e, "a picture that can be encoded")
+                })?;
                 images.push((picture_name(judged), jpeg));
             }
         }
-        let unwritable =
-            |e: std::io::Error| Error::new("--out", format!("\"{e}\""), "a directory to write to");
+        let unwritable = |e| Error::new("--out", format!("\"{e}\""), "a directory to write to");
         output::write(&out.join("images"), &images).map_err(unwritable)?;
         let page = self.page().into_bytes();
         output::write(out, &[("failures.md".to_owned(), page)]).map_err(unwritable)
     }
 
-    fn caption(&self) -> String {
-        format!(
-            "Green passes, yellow is degraded, red fails; * by nature. What the figures are of, and why the \
-             thresholds are where they are: docs/failures.md.\n{}; {}",
-            self.adapter,
-            self.run_by()
-        )
-    }
-
-    fn run_by(&self) -> String {
+    fn page(&self) -> String {
         let options = match self.command {
             "" => String::new(),
             options => format!(" -- {options}"),
         };
-        format!("cargo run --release --example stability{options}")
-    }
-
-    fn page(&self) -> String {
-        let mut page = String::new();
-        let text = INTRODUCTION
-            .replace("COMMAND", &self.run_by())
+        let mut page = INTRODUCTION
+            .replace("OPTIONS", &options)
             .replace("ADAPTER", self.adapter);
-        page += &text;
-        for group in Group::ALL {
+        for group in GROUPS {
             let rows: Vec<&Judged> = self
                 .judged
                 .iter()
@@ -86,136 +59,135 @@ impl Report<'_> {
             if rows.is_empty() {
                 continue;
             }
-            let title = group.title();
-            let _ = writeln!(page, "\n## {}{}\n", title[..1].to_uppercase(), &title[1..]);
-            page += &rows_of(&rows);
-            let mut told = Told::default();
+            let _ = write!(
+                page,
+                "\n## {}{}\n\n",
+                group[..1].to_uppercase(),
+                &group[1..]
+            );
+            page += &table(&rows);
             for family in rows.chunk_by(|a, b| a.case.what == b.case.what) {
-                page += &told.details(family);
+                let names: Vec<&str> = family.iter().map(|j| j.case.name.as_str()).collect();
+                let names = match names[..] {
+                    [first, _, .., last] => format!("{first} to {last}"),
+                    _ => names.join("; "),
+                };
+                page += &wrapped(&format!("**{names}.** {}", family[0].case.what));
+                for judged in family.iter().filter(|j| j.is_shown()) {
+                    let (name, picture) = (&judged.case.name, picture_name(judged));
+                    let _ = write!(page, "\n![{name}: truth and methods](images/{picture})\n");
+                }
             }
+            page += &reasons(&rows);
         }
         page
     }
 }
 
-/// What a picture is worth: where verdicts differ, or ours do not pass.
-fn is_shown(judged: &Judged) -> bool {
-    judged.outcome.shown.is_some()
-        && (judged.rivals_fail_alone() || judged.shortcomings().next().is_some())
-}
-
 fn picture_name(judged: &Judged) -> String {
-    let words = judged
-        .case
-        .title()
-        .replace(|c: char| !c.is_alphanumeric(), "-");
-    let words: Vec<&str> = words.split('-').filter(|w| !w.is_empty()).collect();
-    format!("failures-{}.jpg", words.join("-"))
+    let title = judged.case.title();
+    let words = title
+        .split(|c: char| !c.is_alphanumeric())
+        .filter(|w| !w.is_empty());
+    format!("failures-{}.jpg", words.collect::<Vec<_>>().join("-"))
 }
 
-fn rows_of(rows: &[&Judged]) -> String {
-    let used: Vec<&str> = METHODS
-        .into_iter()
-        .chain([INPUT])
-        .filter(|m| rows.iter().any(|row| row.figure(m).is_some()))
-        .collect();
+fn table(rows: &[&Judged]) -> String {
+    let mut used: Vec<&str> = METHODS.into_iter().chain([INPUT]).collect();
+    used.retain(|m| rows.iter().any(|row| row.figure(m).is_some()));
     let mut text = format!(
         "| | passes | degraded | {} |\n|---|---|---|",
         used.join(" | ")
     );
     text += &"---|".repeat(used.len());
-    text += "\n";
-    for row in rows {
-        let cells = used.iter().map(|method| match row.figure(method) {
-            None => String::new(),
-            Some(figure) => match row.case.verdict(figure) {
-                Verdict::Passes => short(figure),
-                Verdict::Degraded => format!("*{}*", short(figure)),
-                Verdict::Fails => format!("**{}**", short(figure)),
-            },
-        });
-        let cells = cells.collect::<Vec<_>>().join(" | ");
-        let Case { name, .. } = &row.case;
-        let [passes, degrades] = [row.case.passes, row.case.degrades].map(short);
-        let _ = writeln!(text, "| {name} | ≤ {passes} | ≤ {degrades} | {cells} |");
+    for Judged { case, outcome, .. } in rows {
+        let [passes, degrades] = [case.bound.passes, case.bound.degrades].map(short);
+        let _ = write!(text, "\n| {} | ≤ {passes} | ≤ {degrades} |", case.name);
+        for method in &used {
+            let figure = outcome.figures.iter().find(|(m, _)| m == method);
+            let cell = figure.map_or(String::new(), |(_, figure)| match case.verdict(*figure) {
+                Verdict::Passes => short(*figure),
+                Verdict::Degraded => format!("*{}*", short(*figure)),
+                Verdict::Fails => format!("**{}**", short(*figure)),
+            });
+            let _ = write!(text, " {cell} |");
+        }
+    }
+    text + "\n"
+}
+
+/// Why thresholds are where they are, and why ours does not pass: each reason once, with its cases.
+fn reasons(rows: &[&Judged]) -> String {
+    let mut text = String::new();
+    let mut said: Vec<(String, &str, Vec<&str>)> = Vec::new();
+    let mut say =
+        |of: String, why, name| match said.iter_mut().find(|(o, w, _)| *o == of && *w == why) {
+            Some((.., names)) => names.push(name),
+            None => said.push((of, why, vec![name])),
+        };
+    for Judged { case, .. } in rows {
+        let [passes, degrades] = [case.bound.passes, case.bound.degrades].map(short);
+        say(
+            format!("≤ {passes}, ≤ {degrades}"),
+            case.bound.why,
+            &case.name,
+        );
+    }
+    for judged in rows {
+        for known in judged.shortcomings() {
+            let nature = if known.by_nature { ", by nature" } else { "" };
+            say(
+                format!("`{}`{nature}", known.method),
+                known.why,
+                &judged.case.name,
+            );
+        }
+    }
+    for (of, why, names) in said {
+        let of_all = names.len() == rows.len();
+        let names = if of_all {
+            "all".into()
+        } else {
+            names.join("; ")
+        };
+        text += &wrapped(&format!("- {of} ({names}): {why}"));
     }
     text
 }
 
-/// What has been said of a group, so that it is said once.
-#[derive(Default)]
-struct Told {
-    bounds: Vec<[String; 3]>,
-    /// Why a mode does not pass, and of which cases that was said.
-    reasons: Vec<(String, String)>,
-}
-
-impl Told {
-    /// Cases that are described in the same words, together.
-    fn details(&mut self, family: &[&Judged]) -> String {
-        let names: Vec<&str> = family.iter().map(|j| j.case.name.as_str()).collect();
-        let names = names.join("; ");
-        let mut text = format!("\n**{names}.** {}", family[0].case.what);
-        for Judged { case, .. } in family {
-            let bounds = [short(case.passes), short(case.degrades), case.why.clone()];
-            if !self.bounds.contains(&bounds) {
-                let [passes, degrades, why] = &bounds;
-                let _ = write!(text, " Passes to {passes}, degraded to {degrades}: {why}");
-                self.bounds.push(bounds);
-            }
-        }
-        text += "\n";
-        let mut reasons: Vec<(&str, bool, Vec<&str>)> = Vec::new();
-        for known in family.iter().flat_map(|j| j.shortcomings()) {
-            let said = reasons
-                .iter_mut()
-                .find(|(why, nature, _)| *why == known.why && *nature == known.by_nature);
-            match said {
-                Some((.., methods)) if methods.contains(&known.method) => (),
-                Some((.., methods)) => methods.push(known.method),
-                None => reasons.push((&known.why, known.by_nature, vec![known.method])),
-            }
-        }
-        for (why, by_nature, methods) in reasons {
-            let methods = methods.join("`, `");
-            let nature = if by_nature { ", by nature" } else { "" };
-            let said = self.reasons.iter().find(|(reason, _)| reason == why);
-            let reason = match said {
-                Some((_, of)) => format!("as for *{of}*."),
-                None => why.to_owned(),
-            };
-            let _ = writeln!(text, "\n- `{methods}`{nature}: {reason}");
-            if said.is_none() {
-                self.reasons.push((why.to_owned(), names.clone()));
-            }
-        }
-        for judged in family.iter().filter(|j| is_shown(j)) {
-            let name = &judged.case.name;
-            if family.len() > 1 {
-                let _ = writeln!(text, "\n*{name}:*");
-            }
-            let picture = picture_name(judged);
-            let _ = writeln!(text, "\n![{name}: truth and methods](images/{picture})");
-        }
-        text
+/// A paragraph, in lines of less than 110 columns.
+fn wrapped(text: &str) -> String {
+    let mut lines = String::new();
+    let mut column = 0;
+    for word in text.split(' ') {
+        let length = word.chars().count() + 1;
+        column = if column + length < 110 {
+            column + length
+        } else {
+            length
+        };
+        lines += if column == length { "\n" } else { " " };
+        lines += word;
     }
+    lines + "\n"
 }
 
 const INTRODUCTION: &str = "\
 # The failure atlas
 
-![Cases against methods](images/failures.svg)
-
 Written by
 
-    COMMAND
+    cargo run --release --example stabilityOPTIONS
 
-on ADAPTER. The quick form of it runs before every change, and fails where a mode of this crate is worse
-than this page says. Which mode and settings a scene needs, [choosing.md](choosing.md) draws from it.
+on ADAPTER.
 
-In the tables, figures in *italics* are degraded, those in **bold** fail. Irradiance is linear, and white is 1.
-\"The visible integral\" is Eq. 7 over what the camera sees, \"the closed form\" is Eq. 7 solved on paper, both divided by
-the kernel's mass. Below each table, cases that differ in a number or two are described together; a reason, for a
-threshold or for a mode that does not pass, is given where a group first needs it. In pictures the upper row shows
-the truth and the methods, the lower row their errors, ten times as bright.
+The quick form of it runs before every change, and fails where a method of this crate is worse than this page
+says. Which plan and settings a scene needs, [choosing.md](choosing.md) draws from it.
+
+In the tables, figures in *italics* are degraded, those in **bold** fail. Irradiance is linear, and white is
+1. \"The visible integral\" is Eq. 7 over what the camera sees, \"the closed form\" is Eq. 7 solved on paper,
+both divided by the kernel's mass. `screen_exact` is the exact sum, `screen_planned` a plan for an error of
+1/255. Below each table: what the cases are, why the thresholds are where they are, and why a method of ours
+does not pass. In pictures the upper row shows the truth and the methods, the lower row their errors, ten
+times as bright.
 ";

@@ -1,16 +1,16 @@
 //! A picture of a case: the truth and every method side by side, and below each its error.
 
-use crate::Error;
 use glam::Vec3;
 use image::{Rgb, RgbImage, imageops};
 
-use crate::stability::case::{Judged, Shown, short};
+use crate::Error;
+use crate::stability::case::{Judged, Shown, Verdict, short};
 use crate::svg::{Rasteriser, Svg, Type};
 
 /// How much errors are amplified.
 pub const GAIN: f32 = 10.0;
 
-/// Side of a panel, at most, in units of the drawing; pictures have twice as many pixels.
+/// Side of a panel, at most, in pixels of the picture.
 const PANEL: u32 = 116;
 const GAP: u32 = 6;
 const LABEL: u32 = 30;
@@ -28,51 +28,49 @@ pub fn strip(judged: &Judged, rasteriser: &Rasteriser) -> Result<Option<RgbImage
     else {
         return Ok(None);
     };
-    let zoom = (2 * PANEL / size[0].max(size[1])).max(1);
-    let [width, height] = size.map(|s| (s * zoom).min(2 * PANEL));
-    let columns = results.len() as u32 + 1;
+    let zoom = (PANEL / size[0].max(size[1])).max(1);
+    let [width, height] = size.map(|s| (s * zoom).min(PANEL));
     let step = PANEL + GAP;
     let mut drawing = Svg::default();
-    let mut label = |column: u32, name: &str, figure: &str| {
-        let x = f64::from(GAP + column * step);
-        let set = Type::new("#222", 11.0);
-        drawing.text([x, 12.0], name, set);
+    let mut label = |column: usize, name: &str, figure: &str| {
+        let x = f64::from(GAP + column as u32 * step);
+        drawing.text([x, 12.0], name, Type::new("#222", 11.0));
         drawing.text([x, 25.0], figure, Type::new("#666", 10.0));
     };
     label(0, "truth", &format!("below: errors ×{GAIN:.0}"));
-    for (column, (method, _)) in (1..).zip(results) {
-        let figure = judged.figure(method);
-        let verdict = figure.map_or(String::new(), |f| {
-            format!("{} {}", short(f), judged.case.verdict(f).word())
+    for (i, (method, _)) in results.iter().enumerate() {
+        let verdict = judged.figure(method).map_or(String::new(), |f| {
+            let word = match judged.case.verdict(f) {
+                Verdict::Passes => "passes",
+                Verdict::Degraded => "degraded",
+                Verdict::Fails => "fails",
+            };
+            format!("{} {word}", short(f))
         });
-        label(column, &method.replace('_', " "), &verdict);
+        label(i + 1, &method.replace('_', " "), &verdict);
     }
-    let drawing = drawing.finish(
-        f64::from(GAP + columns * step),
-        f64::from(LABEL + 2 * GAP + height),
-        &judged.case.title(),
-    );
-    let mut picture = rasteriser.picture(&drawing).map_err(|e| {
-        Error::new(
-            judged.case.title(),
-            format!("\"{e}\""),
-            "a picture that can be drawn",
-        )
-    })?;
-    let mut put = |column: u32, row: u32, values: Vec<Vec3>| {
-        let panel = RgbImage::from_fn(size[0], size[1], |x, y| {
-            Rgb(srgb(values[(y * size[0] + x) as usize]))
-        });
+    let picture_size = [
+        GAP + (results.len() as u32 + 1) * step,
+        LABEL + 2 * (GAP + height),
+    ];
+    let [columns, rows] = picture_size.map(f64::from);
+    let title = judged.case.title();
+    let drawing = rasteriser.picture(&drawing.finish(columns, rows, &title));
+    let drawing = drawing
+        .map_err(|e| Error::new(title, format!("\"{e}\""), "a picture that can be drawn"))?;
+    let [columns, rows] = picture_size;
+    let mut picture = imageops::thumbnail(&drawing, columns, rows);
+    let mut put = |column: usize, row: u32, light: &dyn Fn(usize) -> Vec3| {
+        let pixel = |x, y| Rgb(srgb(light((y * size[0] + x) as usize)));
+        let panel = RgbImage::from_fn(size[0], size[1], pixel);
         let panel = imageops::resize(&panel, width, height, imageops::FilterType::Nearest);
-        let x = 2 * (GAP + column * step);
-        let y = 2 * LABEL + row * (height + 2 * GAP);
+        let [x, y] = [GAP + column as u32 * step, LABEL + row * (height + GAP)];
         imageops::replace(&mut picture, &panel, x.into(), y.into());
     };
-    put(0, 0, truth.clone());
-    for (column, (_, result)) in (1..).zip(results) {
-        put(column, 0, result.clone());
-        let error = result.iter().zip(truth).map(|(r, t)| (r - t).abs() * GAIN);
-        put(column, 1, error.collect());
+    put(0, 0, &|i| truth[i]);
+    for (column, (_, result)) in results.iter().enumerate() {
+        put(column + 1, 0, &|i| result[i]);
+        put(column + 1, 1, &|i| (result[i] - truth[i]).abs() * GAIN);
     }
     Ok(Some(picture))
 }

@@ -1,12 +1,13 @@
 //! A synthetic surface in texture space: islands of an atlas, and the way from a pixel to its texel.
 
-use crate::Error;
 use glam::{DVec2, DVec3, UVec2, Vec3};
 use half::f16;
 use subsurface::wgpu::{TextureFormat, TextureView};
 use subsurface::{Atlas, Profile};
 
+use crate::Error;
 use crate::renderer::Gpu;
+use crate::stability::case::Results;
 use crate::stability::lab::{Lab, OUTPUT};
 use crate::truth::{self, Patch, Pixel};
 
@@ -78,22 +79,14 @@ impl Unwrapped {
     ///
     /// # Errors
     /// An atlas that a method refuses.
-    pub fn scatter(
-        &self,
-        lab: &Lab,
-        uvs: &[DVec2],
-    ) -> Result<Vec<(&'static str, Vec<Vec3>)>, Error> {
+    pub fn scatter(&self, lab: &Lab, uvs: &[DVec2]) -> Result<Results, Error> {
         let uploaded = self.upload(&lab.gpu);
         let results = lab
             .scatter_atlas(&uploaded.atlas(), &uploaded.output)?
             .into_iter();
+        let fetched = |texels: Vec<Vec3>| uvs.iter().map(|uv| self.fetch(&texels, *uv)).collect();
         Ok(results
-            .map(|(name, texels)| {
-                (
-                    name,
-                    uvs.iter().map(|uv| self.fetch(&texels, *uv)).collect(),
-                )
-            })
+            .map(|(name, texels)| (name, fetched(texels)))
             .collect())
     }
 
@@ -143,7 +136,7 @@ fn pixel(point_mm: DVec3, irradiance: DVec3, area_mm2: f64) -> Pixel {
             area_mm2: area_mm2 as f32,
             irradiance: irradiance.as_vec3(),
         },
-        // No more than the texels' own spacing: Gaussians narrower than it would come out too narrow.
-        facing_mm2: area_mm2 as f32,
+        // The texels' own spacing, in whatever direction: Gaussians narrower than it would come out too narrow.
+        steps_mm: [DVec3::X, DVec3::Y].map(|step| (step * area_mm2.sqrt()).as_vec3()),
     }
 }

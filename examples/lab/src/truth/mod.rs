@@ -11,11 +11,13 @@
 
 pub mod closed_form;
 mod cloud;
+mod random_walk;
 mod surface;
 mod tree;
 mod visible;
 
 pub use cloud::Patch;
+pub use random_walk::{Walk, random_walk};
 pub use surface::{Place, SurfaceIntegral, Triangles, surface_integral};
 pub use visible::{Pixel, visible_integral};
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use subsurface::{Gaussian, Profile};
 
 use super::Progress;
-use super::cloud::{Cloud, Patch, REACH_SIGMAS};
+use super::cloud::{Cloud, Kernel, Patch, REACH_SIGMAS};
 use super::tree::Tree;
 
 /// A mesh, its hidden side included.
@@ -101,9 +101,10 @@ pub fn surface_integral<E>(
         let sums = |p: &Patch| {
             let mut sums = [Vec3::ZERO; 2];
             for g in gaussians {
-                let lit = lit.sum(p.point_mm, g.variance_mm2);
+                let kernel = Kernel::round(g.variance_mm2);
+                let lit = lit.sum(p.point_mm, &kernel);
                 let mean = Vec3::from(g.weight) * (lit.light / lit.mass).as_vec3();
-                let mass = surface.sum(p.point_mm, g.variance_mm2).mass as f32;
+                let mass = surface.sum(p.point_mm, &kernel).mass as f32;
                 sums[0] += mean * mass / (TAU * g.variance_mm2);
                 sums[1] += mean;
             }

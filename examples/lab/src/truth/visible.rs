@@ -1,27 +1,28 @@
 //! The visible integral: Eq. 7 over what the camera sees.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use subsurface::Profile;
 
 use super::Progress;
-use super::cloud::{Cloud, Patch};
+use super::cloud::{Cloud, Kernel, Patch};
 
 /// What a pixel sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pixel {
     /// The surface that it shows: irradiance as the frame has it, area on the tangent plane.
     pub patch: Patch,
-    /// The area that it would show of a surface facing the camera, in mm².
-    pub facing_mm2: f32,
+    /// ∂p/∂x and ∂p/∂y: the way on its tangent plane to where the next pixel in the row, and in the column,
+    /// looks.
+    pub steps_mm: [Vec3; 2],
 }
 
 /// Σᵢ wᵢ ∫ E Gᵢ dA / ∫ Gᵢ dA over what the camera sees: every pixel summed for every pixel, no taps,
 /// no separability. It is the best that a method can do that knows the frame alone.
 ///
 /// `pixels` are those of one profile, `asked` are places among them; the result is theirs. Point
-/// weights of Gaussians narrower than a pixel spread too little; they take the variance by which
-/// light that is soft by a pixel comes out right.
+/// weights of Gaussians narrower than a pixel spread too little; along the lattice that the pixels form on
+/// the surface, and across it, they take the variance by which light that is soft by a pixel comes out right.
 pub fn visible_integral(
     pixels: &[Pixel],
     asked: &[usize],
@@ -34,12 +35,12 @@ pub fn visible_integral(
         .par_iter()
         .map(|&i| {
             let pixel = &pixels[i];
+            let lattice = Lattice::new(pixel.steps_mm);
             let scattered = profile.gaussians().iter().map(|g| {
                 if g.variance_mm2 == 0.0 {
                     return Vec3::from(g.weight) * pixel.patch.irradiance;
                 }
-                let v = lattice_variance(g.variance_mm2.into(), pixel.facing_mm2.into());
-                let sum = cloud.sum(pixel.patch.point_mm, v as f32);
+                let sum = cloud.sum(pixel.patch.point_mm, &lattice.kernel(g.variance_mm2));
                 Vec3::from(g.weight) * (sum.light / sum.mass).as_vec3()
             });
             let sum = scattered.sum();
@@ -47,6 +48,55 @@ pub fn visible_integral(
             sum
         })
         .collect()
+}
+
+/// How the pixels around one lie on its tangent plane.
+struct Lattice {
+    /// Unit vectors along its shortest step, and across.
+    axes: [DVec3; 2],
+    /// Between points along a row, and between rows.
+    spacing_mm: [f64; 2],
+}
+
+/// Rows that look farther apart than so many of their points, beyond 75°, are not told from a surface that
+/// bends within a pixel, whose rows are not: they are taken to be so far apart.
+const FARTHEST_ROWS: f64 = 4.0;
+
+impl Lattice {
+    fn new(steps_mm: [Vec3; 2]) -> Self {
+        let [mut a, mut b] = steps_mm.map(|step| step.as_dvec3());
+        // Lagrange's reduction: the shortest steps, which are nearest to a right angle.
+        loop {
+            if b.length_squared() < a.length_squared() {
+                (a, b) = (b, a);
+            }
+            let times = (a.dot(b) / a.length_squared()).round();
+            if times == 0.0 || !times.is_finite() {
+                break;
+            }
+            b -= times * a;
+        }
+        let along = a.normalize_or_zero();
+        let across = b - along * b.dot(along);
+        let spacing = a.length();
+        Self {
+            axes: [along, across.normalize_or_zero()],
+            spacing_mm: [spacing, across.length().min(FARTHEST_ROWS * spacing)],
+        }
+    }
+
+    /// The weights of a Gaussian.
+    fn kernel(&self, variance_mm2: f32) -> Kernel {
+        let variances = self
+            .spacing_mm
+            .map(|mm| lattice_variance(variance_mm2.into(), mm * mm));
+        let narrow = usize::from(variances[1] < variances[0]);
+        let [narrowest, widest] = [variances[narrow], variances[1 - narrow]];
+        Kernel {
+            variance_mm2: widest as f32,
+            narrowed: (self.axes[narrow] * (narrowest.recip() - widest.recip()).sqrt()).as_vec3(),
+        }
+    }
 }
 
 /// The wave, in radians a pixel, that weights pass as their Gaussian would. Edges that are soft by a
@@ -84,4 +134,77 @@ fn lattice_variance(variance_mm2: f64, cell_mm2: f64) -> f64 {
         }
     }
     low * cell_mm2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::truth::closed_form::{scattered_step, step};
+    use glam::DMat3;
+
+    /// The largest error on an edge that the picture shows soft by a pixel, on a plane that is turned by
+    /// `tilt`° about the image axis at `axis`°; with the lattice of the surface, or of one facing the camera.
+    fn worst(px_per_mm: f64, tilt: f64, axis: f64, edge: f64, is_own: bool) -> f64 {
+        let (sin, cos) = f64::to_radians(axis).sin_cos();
+        let turn = DMat3::from_axis_angle(DVec3::new(cos, sin, 0.0), tilt.to_radians());
+        let (u, v, normal) = (turn.x_axis, turn.y_axis, turn.z_axis);
+        let px = px_per_mm.recip();
+        let steps = [DVec3::X, DVec3::Y].map(|e| px * (e - DVec3::Z * (e.dot(normal) / normal.z)));
+        let (sin, cos) = edge.to_radians().sin_cos();
+        let across = cos * u + sin * v;
+        // The mm across the edge from one pixel to the next where that is most.
+        let blur_mm2 = steps.iter().map(|s| s.dot(across).powi(2)).sum::<f64>();
+        let half = (14.0 * px_per_mm) as i32;
+        let (mut pixels, mut asked) = (Vec::new(), Vec::new());
+        for y in -half..=half {
+            for x in -half..=half {
+                let point = f64::from(x) * steps[0] + f64::from(y) * steps[1];
+                if x.abs().max(y.abs()) <= 3 {
+                    asked.push(pixels.len());
+                }
+                let facing = [Vec3::X, Vec3::Y].map(|e| e * px as f32);
+                pixels.push(Pixel {
+                    patch: Patch {
+                        point_mm: point.as_vec3(),
+                        area_mm2: steps[0].cross(steps[1]).length() as f32,
+                        irradiance: Vec3::splat(step(point.dot(across), blur_mm2) as f32),
+                    },
+                    steps_mm: if is_own {
+                        steps.map(|s| s.as_vec3())
+                    } else {
+                        facing
+                    },
+                });
+            }
+        }
+        let found = visible_integral(&pixels, &asked, &Profile::SKIN, &|_| ());
+        let error = |(i, found): (&usize, &Vec3)| {
+            let x = pixels[*i].patch.point_mm.as_dvec3().dot(across);
+            (found.as_dvec3() - scattered_step(x, blur_mm2, &Profile::SKIN))
+                .abs()
+                .max_element()
+        };
+        asked.iter().zip(&found).map(error).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn slopes_are_summed_on_their_own_lattice() {
+        for (px_per_mm, tilt) in [
+            (3.0, 0.0),
+            (3.0, 40.0),
+            (3.0, 60.0),
+            (5.0, 60.0),
+            (3.0, 70.0),
+        ] {
+            for axis in [0.0, 25.0, 45.0] {
+                for edge in [0.0, 45.0, 90.0] {
+                    let [own, facing] =
+                        [true, false].map(|is_own| worst(px_per_mm, tilt, axis, edge, is_own));
+                    println!(
+                        "{px_per_mm} px/mm, {tilt}° about {axis}°, edge {edge}°: {own:.4} ({facing:.4})"
+                    );
+                }
+            }
+        }
+    }
 }

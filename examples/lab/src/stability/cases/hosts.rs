@@ -1,16 +1,16 @@
 //! What hosts do to an effect over many frames.
 
-mod memory;
+use std::fs;
 
+use glam::DVec3;
+
+use super::STEP;
 use crate::Error;
-use glam::{DVec3, Vec3};
-use subsurface::Profile;
-
-use super::surface::{Methods, Surface, Uploaded, methods, ours};
-use super::{STEP, larger, worst};
 use crate::renderer::Gpu;
-use crate::stability::case::{Case, Group, METHODS, Outcome};
-use crate::stability::lab::Lab;
+use crate::stability::case::{Bound, Case, Figures};
+use crate::stability::inputs::{Texels, Uploaded};
+use crate::stability::lab::{Lab, methods, ours};
+use crate::stability::trial::{largest, merge};
 use crate::synthetic::{View, sphere};
 
 pub fn cases(quick: bool) -> Vec<Case> {
@@ -19,216 +19,226 @@ pub fn cases(quick: bool) -> Vec<Case> {
         switched(quick),
         interleaved(),
         lost(),
-        memory::case(quick),
+        leaks(quick),
     ]
 }
 
 /// A ball of skin lit from one side; small, since it is drawn often.
 fn ball(size: [u32; 2], gpu: &Gpu) -> Uploaded {
-    let view = View::perspective(size, 8.0);
     let to_light = DVec3::new(0.8, 0.0, 0.6);
     let light = |n: DVec3| DVec3::splat(n.dot(to_light).max(0.0));
-    let g = view.shoot(sphere(15.0, 300.0, light));
-    Surface::of(&g, DVec3::ZERO).upload(gpu)
+    let g = View::perspective(size, 8.0).shoot(sphere(15.0, 300.0, light));
+    Texels::of(&g, 0.0).upload(gpu)
 }
 
 /// Pixels of a frame, alpha included.
 type Pixels = Vec<[f32; 4]>;
 
-/// The largest difference between two frames; not a number where one is none.
+/// The largest difference between two frames; NaN where one is.
 fn apart(a: &Pixels, b: &Pixels) -> f64 {
-    let light =
-        |p: &Pixels| -> Vec<Vec3> { p.iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect() };
-    let truth: Vec<_> = light(b).iter().map(|e| e.as_dvec3()).enumerate().collect();
-    worst(&vec![("", light(a))], &truth)[0].1
+    let pairs = a.iter().flatten().zip(b.iter().flatten());
+    largest(pairs.map(|(a, b)| f64::from((a - b).abs())))
 }
 
-/// Each method's largest difference over all frames.
-#[derive(Default)]
-struct Worst(Vec<(&'static str, f64)>);
-
-impl Worst {
-    fn add(&mut self, method: &'static str, figure: f64) {
-        match self.0.iter_mut().find(|(m, _)| *m == method) {
-            Some((_, worst)) => *worst = larger(*worst, figure),
-            None => self.0.push((method, figure)),
-        }
-    }
-
-    fn outcome(mut self) -> Outcome {
-        self.0
-            .sort_by_key(|(m, _)| METHODS.iter().position(|n| n == m));
-        Outcome {
-            figures: self.0,
-            shown: None,
-        }
-    }
-}
-
-fn new_methods(lab: &Lab, gpu: &Gpu) -> Result<Methods, Error> {
-    methods(gpu, &Profile::SKIN, &lab.plan)
-}
-
-/// Bit for bit: `passes` and the reason for it.
-const SAME: f64 = 0.0;
-const WHY_SAME: &str = "The same work on the same device gives the same bits, so that any difference is left over from another \
-                        frame; one of up to 1/255 is no more than a step of eight bits.";
+const SAME: Bound = Bound {
+    passes: 0.0,
+    degrades: STEP,
+    why: "the same work on the same device gives the same bits; any difference is left over from \
+          another frame.",
+};
 
 /// Another size every frame.
 fn resized(quick: bool) -> Case {
     let frames = if quick { 20 } else { 200 };
-    Case {
-        group: Group::Hosts,
-        name: "another size every frame".into(),
-        what: format!(
-            "{frames} frames of a ball of skin, in turn of 33x17, 48x48 and 5x40 pixels: the largest difference \
-             to what a new effect makes of the same frame."
-        ),
-        passes: SAME,
-        degrades: STEP,
-        why: WHY_SAME.into(),
-        known: vec![],
-        run: Box::new(move |lab| {
-            let gpu = &lab.gpu;
-            let surfaces = [[33, 17], [48, 48], [5, 40]].map(|size| ball(size, gpu));
-            let mut anew: Vec<Vec<Pixels>> = Vec::new();
-            for surface in &surfaces {
-                let mut methods = new_methods(lab, gpu)?;
-                let of_all = methods
-                    .iter_mut()
-                    .map(|(_, method)| surface.by(gpu, method));
-                anew.push(of_all.collect::<Result<_, _>>()?);
+    let what = format!(
+        "{frames} frames of a ball of skin, in turn of 33x17, 48x48 and 5x40 pixels: largest \
+         difference to what a new effect makes of the same frame."
+    );
+    Case::new("another size every frame", what, SAME, move |lab| {
+        let gpu = &lab.gpu;
+        let balls = [[33, 17], [48, 48], [5, 40]].map(|size| ball(size, gpu));
+        let mut anew: Vec<Vec<Pixels>> = Vec::new();
+        for ball in &balls {
+            let mut methods = methods(gpu, &lab.plan)?;
+            let of_all = methods
+                .iter_mut()
+                .map(|(_, method)| method.scatter(gpu, ball));
+            anew.push(of_all.collect::<Result<_, _>>()?);
+        }
+        let mut kept = methods(gpu, &lab.plan)?;
+        let mut figures = Figures::new();
+        for frame in 0..frames {
+            // Every fifth frame skips one, so that each size follows on different ones.
+            let i = (frame + frame / 5) % balls.len();
+            for ((name, method), anew) in kept.iter_mut().zip(&anew[i]) {
+                merge(
+                    &mut figures,
+                    [(*name, apart(&method.scatter(gpu, &balls[i])?, anew))],
+                );
             }
-            let mut kept = new_methods(lab, gpu)?;
-            let mut figures = Worst::default();
-            for frame in 0..frames {
-                // Every fifth frame skips one, so that each size follows on different ones.
-                let i = (frame + frame / 5) % surfaces.len();
-                for ((name, method), anew) in kept.iter_mut().zip(&anew[i]) {
-                    let scattered = surfaces[i].by(gpu, method)?;
-                    figures.add(name, apart(&scattered, anew));
-                }
-            }
-            Ok(figures.outcome())
-        }),
-    }
+        }
+        Ok(figures.into())
+    })
 }
 
 /// Another method every frame, into the same texture.
 fn switched(quick: bool) -> Case {
     let rounds = if quick { 3 } else { 30 };
-    Case {
-        group: Group::Hosts,
-        name: "another method every frame".into(),
-        what: format!(
-            "{rounds} rounds over all methods, each in another order, a frame of the same size for each method, all into one \
-             texture that none of them clears: the largest difference to what a new effect makes of the frame alone."
-        ),
-        passes: SAME,
-        degrades: STEP,
-        why: WHY_SAME.into(),
-        known: vec![],
-        run: Box::new(move |lab| {
-            let gpu = &lab.gpu;
-            let mut alone = Vec::new();
-            for (_, method) in &mut new_methods(lab, gpu)? {
-                alone.push(ball([48, 40], gpu).by(gpu, method)?);
-            }
-            let shared = ball([48, 40], gpu);
-            let mut kept = new_methods(lab, gpu)?;
-            let count = kept.len();
-            let mut figures = Worst::default();
-            for frame in 0..rounds * count {
-                // Steps that have no divisor in common with the count come by all of them.
-                let step = [1, 3, 5, 7][frame / count % 4];
-                let (name, method) = &mut kept[frame * step % count];
-                let scattered = shared.by(gpu, method)?;
-                figures.add(name, apart(&scattered, &alone[frame * step % count]));
-            }
-            Ok(figures.outcome())
-        }),
-    }
+    let what = format!(
+        "{rounds} rounds over all methods, each in another order, a frame of the same size for \
+         each, all into one texture that none of them clears: largest difference to what a new \
+         effect makes of the frame alone."
+    );
+    Case::new("another method every frame", what, SAME, move |lab| {
+        let gpu = &lab.gpu;
+        let mut alone = Vec::new();
+        for (_, method) in &mut methods(gpu, &lab.plan)? {
+            alone.push(method.scatter(gpu, &ball([48, 40], gpu))?);
+        }
+        let shared = ball([48, 40], gpu);
+        let mut kept = methods(gpu, &lab.plan)?;
+        let count = kept.len();
+        let mut figures = Figures::new();
+        for frame in 0..rounds * count {
+            // Steps that have no divisor in common with the count come by all of them.
+            let i = frame * [1, 3, 5, 7][frame / count % 4] % count;
+            let (name, method) = &mut kept[i];
+            merge(
+                &mut figures,
+                [(*name, apart(&method.scatter(gpu, &shared)?, &alone[i]))],
+            );
+        }
+        Ok(figures.into())
+    })
 }
 
-/// Two effects of each method, two frames, one submission.
+/// Two views of each method, two frames, one submission.
 fn interleaved() -> Case {
-    Case {
-        group: Group::Hosts,
-        name: "two effects, one submission".into(),
-        what: "Two frames of different sizes, each with an effect of its own, both prepared and then both recorded into one \
-               command buffer: the largest difference to what an effect makes of either alone."
-            .into(),
-        passes: SAME,
-        degrades: STEP,
-        why: WHY_SAME.into(),
-        known: vec![],
-        run: Box::new(|lab| {
-            let gpu = &lab.gpu;
-            let surfaces = [[48, 40], [31, 57]].map(|size| ball(size, gpu));
-            let [first, second] = [new_methods(lab, gpu)?, new_methods(lab, gpu)?];
-            let mut figures = Worst::default();
-            for ((name, a), (_, b)) in first.into_iter().zip(second) {
-                let mut effects = [a, b];
-                let mut alone = Vec::new();
-                for (surface, effect) in surfaces.iter().zip(&mut effects) {
-                    alone.push(surface.by(gpu, effect)?);
-                }
-                // Each now has the other's frame.
-                let [a, b] = &mut effects;
-                a.prepare(gpu, &surfaces[1])?;
-                b.prepare(gpu, &surfaces[0])?;
-                gpu.run(|encoder| {
-                    a.render(encoder, surfaces[1].output())?;
-                    b.render(encoder, surfaces[0].output())
-                })?;
-                for (surface, alone) in surfaces.iter().zip(&alone) {
-                    figures.add(name, apart(&surface.read(gpu), alone));
-                }
+    let what = "Two frames of different sizes, each with a view of its own, both prepared and \
+        then both recorded into one command buffer: largest difference to what a method makes of \
+        either alone.";
+    Case::new("two views, one submission", what, SAME, |lab| {
+        let gpu = &lab.gpu;
+        let balls = [[48, 40], [31, 57]].map(|size| ball(size, gpu));
+        let mut figures = Figures::new();
+        for ((name, mut a), (_, mut b)) in methods(gpu, &lab.plan)?
+            .into_iter()
+            .zip(methods(gpu, &lab.plan)?)
+        {
+            let alone = [a.scatter(gpu, &balls[0])?, b.scatter(gpu, &balls[1])?];
+            // Each now has the other's frame.
+            a.prepare(gpu, &balls[1])?;
+            b.prepare(gpu, &balls[0])?;
+            gpu.run(|encoder| {
+                a.render(encoder, &balls[1].output)?;
+                b.render(encoder, &balls[0].output)
+            })?;
+            for (ball, alone) in balls.iter().zip(&alone) {
+                merge(
+                    &mut figures,
+                    [(name, apart(&gpu.read(&ball.output), alone))],
+                );
             }
-            Ok(figures.outcome())
-        }),
-    }
+        }
+        Ok(figures.into())
+    })
 }
 
 /// A device that goes away under its effects.
 fn lost() -> Case {
-    Case {
-        group: Group::Hosts,
-        name: "a lost device".into(),
-        what: "A device is destroyed; its effects prepare and record another frame all the same, and are dropped. The figure \
-               is the largest difference of what a new device with new effects makes of that frame to what the first \
-               one made of it. A panic ends the run; what the lost device complains of does not count. Rivals are left \
-               out, since how they take it is up to this harness."
-            .into(),
-        passes: SAME,
-        degrades: STEP,
-        why: WHY_SAME.into(),
-        known: vec![],
-        run: Box::new(|lab| {
-            let before = {
-                let gpu = Gpu::headless()?;
-                gpu.device.on_uncaptured_error(std::sync::Arc::new(|_| {}));
-                let surface = ball([48, 40], &gpu);
-                let mut methods = ours(&gpu, &lab.plan)?;
-                let of_all = methods.iter_mut().map(|(_, method)| surface.by(&gpu, method));
-                let before = of_all.collect::<Result<Vec<_>, _>>()?;
-                gpu.device.destroy();
-                let mut encoder = gpu.device.create_command_encoder(&Default::default());
-                for (_, method) in &mut methods {
-                    // An error is as good an answer as none.
-                    let _ = method.prepare(&gpu, &surface);
-                    let _ = method.render(&mut encoder, surface.output());
-                }
-                gpu.queue.submit([encoder.finish()]);
-                before
-            };
+    let what = "A device is destroyed; its effects prepare and record another frame all the \
+        same, and are dropped: largest difference of what a new device with new effects makes of \
+        that frame to what the first one made of it. A panic ends the run. Rivals are left out, \
+        since how they take it is up to this harness.";
+    Case::new("a lost device", what, SAME, |lab| {
+        let before = {
             let gpu = Gpu::headless()?;
-            let surface = ball([48, 40], &gpu);
-            let mut figures = Worst::default();
-            for ((name, mut method), before) in ours(&gpu, &lab.plan)?.into_iter().zip(&before) {
-                figures.add(name, apart(&surface.by(&gpu, &mut method)?, before));
+            gpu.device.on_uncaptured_error(std::sync::Arc::new(|_| {}));
+            let ball = ball([48, 40], &gpu);
+            let mut methods = ours(&gpu, &lab.plan)?;
+            let of_all = methods
+                .iter_mut()
+                .map(|(_, method)| method.scatter(&gpu, &ball));
+            let before = of_all.collect::<Result<Vec<_>, _>>()?;
+            gpu.device.destroy();
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            for (_, method) in &mut methods {
+                // An error is as good an answer as none.
+                let _ = method.prepare(&gpu, &ball);
+                let _ = method.render(&mut encoder, &ball.output);
             }
-            Ok(figures.outcome())
-        }),
-    }
+            gpu.queue.submit([encoder.finish()]);
+            before
+        };
+        let gpu = Gpu::headless()?;
+        let ball = ball([48, 40], &gpu);
+        let mut figures = Figures::new();
+        for ((name, mut method), before) in ours(&gpu, &lab.plan)?.into_iter().zip(&before) {
+            figures.push((name, apart(&method.scatter(&gpu, &ball)?, before)));
+        }
+        Ok(figures.into())
+    })
+}
+
+/// Memory that frames leave behind.
+fn leaks(quick: bool) -> Case {
+    let frames = if quick { 150 } else { 10_000 };
+    let what = format!(
+        "{frames} frames, in turn ten of 32x32 and ten of 24x40 pixels: by how many KiB a frame \
+         the memory of the process grows (on Linux), or that of the device's allocator, \
+         whichever grows more. The half of the frames in which it grows less counts: a leak \
+         shows in both, what a heap or a driver keeps for later in one. A third as many frames \
+         go before, uncounted."
+    );
+    let bound = Bound {
+        passes: 0.25,
+        degrades: 2.0,
+        why: "0.25 KiB a frame is 53 MiB in an hour at 60 Hz. A frame's settings take 2 KiB, its \
+              textures here 8 KiB each.",
+    };
+    Case::new(
+        format!("{frames} frames, what they leave"),
+        what,
+        bound,
+        move |lab: &Lab| {
+            let gpu = &lab.gpu;
+            let balls = [[32, 32], [24, 40]].map(|size| ball(size, gpu));
+            let mut figures = Figures::new();
+            for (name, mut method) in methods(gpu, &lab.plan)? {
+                let mut frame = 0;
+                let mut go_on = |frames: usize| -> Result<[f64; 2], Error> {
+                    for _ in 0..frames {
+                        let ball = &balls[frame / 10 % 2];
+                        method.prepare(gpu, ball)?;
+                        gpu.run(|encoder| method.render(encoder, &ball.output))?;
+                        frame += 1;
+                    }
+                    Ok(bytes(gpu))
+                };
+                let [start, middle, end] =
+                    [go_on(frames / 3)?, go_on(frames / 2)?, go_on(frames / 2)?];
+                let growth = |i: usize| (middle[i] - start[i]).min(end[i] - middle[i]).max(0.0);
+                figures.push((
+                    name,
+                    growth(0).max(growth(1)) / 1024.0 / (frames / 2) as f64,
+                ));
+            }
+            Ok(figures.into())
+        },
+    )
+}
+
+/// Of the process, and of the device; 0 where it cannot be told.
+fn bytes(gpu: &Gpu) -> [f64; 2] {
+    let statm = fs::read_to_string("/proc/self/statm").unwrap_or_default();
+    let pages = statm
+        .split(' ')
+        .nth(1)
+        .and_then(|pages| pages.parse::<f64>().ok());
+    let report = gpu.device.generate_allocator_report();
+    [
+        // Where pages are larger than on all that is usual, the figure is too small by as much.
+        pages.unwrap_or(0.0) * 4096.0,
+        report.map_or(0.0, |r| r.total_allocated_bytes as f64),
+    ]
 }
