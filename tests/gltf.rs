@@ -530,7 +530,7 @@ fn a_refusal_blames_what_is_wrong() {
                 "/textures/0",
                 json!({"extensions": {"KHR_texture_basisu": {"source": 0}}}),
             ),
-            "texture 0: got no image, but [KHR_texture_basisu]",
+            "texture 0: got no image, but [\"KHR_texture_basisu\"]",
         ),
         (
             read(|m| {

@@ -87,7 +87,7 @@ impl Camera {
         Self::facing(Head::of(scene).forward, view, target, distance)
     }
 
-    /// Turned about what it looks at, in radians, to the right of a person who faces it.
+    /// Turned about what it looks at, in radians, towards the right of a person who faces it.
     pub fn turned(mut self, angle: f32) -> Self {
         self.eye = self.target + Quat::from_rotation_y(-angle) * (self.eye - self.target);
         self

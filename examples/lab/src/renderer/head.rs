@@ -25,14 +25,16 @@ impl Head {
     pub fn of(scene: &Scene) -> Self {
         let whole = scene.skin_bounds();
         let size = |(min, max): (Vec3, Vec3)| (max - min).length();
-        let with_neck = |(min, max): (Vec3, Vec3)| (min - 0.25 * (max.y - min.y) * Vec3::Y, max);
+        // Each with how much of its height below it is chin and neck.
         let found = by_joints(scene)
-            .map(with_neck)
-            .or_else(|| by_names(scene))
-            .or_else(|| by_features(scene))
-            .or_else(|| by_shape(scene).map(with_neck))
-            .filter(|found| size(*found) > 0.0 && size(*found) < PART * size(whole));
-        let (min, max) = found.unwrap_or(whole);
+            .map(|head| (head, 0.25))
+            .or_else(|| by_names(scene).map(|head| (head, 0.0)))
+            .or_else(|| by_features(scene).map(|head| (head, 0.0)))
+            .or_else(|| by_shape(scene).map(|head| (head, 0.45)));
+        let is_part = |size_of_head: f32| size_of_head > 0.0 && size_of_head < PART * size(whole);
+        let found = found.filter(|(head, _)| is_part(size(*head)));
+        let ((mut min, max), below) = found.unwrap_or((whole, 0.0));
+        min.y -= below * (max.y - min.y);
         let forward = forward(scene, (min, max)).unwrap_or(Vec3::Z);
         Self { min, max, forward }
     }
@@ -153,7 +155,7 @@ impl Limb {
             (self.widest, self.narrowest) = (area, area);
         }
         if area <= self.narrowest {
-            // Below the chin it is neck.
+            // Where it is much narrower, from the chin on, it is neck.
             if self.narrowest > 0.7 * self.widest {
                 self.head = self.all;
             }
@@ -167,7 +169,7 @@ impl Limb {
         let size = self.head.1 - self.head.0;
         [size.x, size.z]
             .iter()
-            .all(|x| (0.4..=2.2).contains(&(x / size.y)))
+            .all(|x| (0.4..=2.5).contains(&(x / size.y)))
     }
 }
 

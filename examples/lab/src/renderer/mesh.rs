@@ -146,27 +146,20 @@ impl Mesh {
                     [128, 128, 255, 255],
                 );
                 let uniform = buffer(bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM);
+                let sampler = sampler(material.wrap);
+                let resources = [
+                    uniform.as_entire_binding(),
+                    wgpu::BindingResource::TextureView(&color),
+                    wgpu::BindingResource::TextureView(&normal),
+                    wgpu::BindingResource::Sampler(&sampler),
+                ];
+                let entries = (0..).zip(resources);
+                let entries =
+                    entries.map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
                 let material_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                     label,
                     layout,
-                    entries: &[
-                        wgpu::BindGroupEntry {
-                            binding: 0,
-                            resource: uniform.as_entire_binding(),
-                        },
-                        wgpu::BindGroupEntry {
-                            binding: 1,
-                            resource: wgpu::BindingResource::TextureView(&color),
-                        },
-                        wgpu::BindGroupEntry {
-                            binding: 2,
-                            resource: wgpu::BindingResource::TextureView(&normal),
-                        },
-                        wgpu::BindGroupEntry {
-                            binding: 3,
-                            resource: wgpu::BindingResource::Sampler(&sampler(material.wrap)),
-                        },
-                    ],
+                    entries: &Vec::from_iter(entries),
                 });
                 Ok(Self {
                     name: primitive.name.clone(),

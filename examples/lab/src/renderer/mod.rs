@@ -7,10 +7,12 @@
 
 mod accessor;
 mod atlas;
+mod attributes;
 mod camera;
 mod gpu;
 mod head;
 mod lighting;
+mod materials;
 mod mesh;
 mod names;
 mod pages;
