@@ -1,54 +1,43 @@
-// A skin ball, half behind a grey one, over a floor; the camera at the origin looks along -z. Metres.
-override scale_x: f32;
-override scale_y: f32;
-override near: f32;
+// Two balls in metres: skin at the origin and a grey one before it, lit up to a hard edge.
+const FOV = array(0.5, 0.3); // by camera, in radians, as the host has them
+const NEAR = 0.05;
+const COLUMNS = 256u;
+const ROWS = 128u;
+const PI = 3.14159265;
 
-struct Vertex {
+struct Surface {
     @builtin(position) position: vec4f,
-    @location(0) ndc: vec2f,
+    @location(0) world: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) @interpolate(flat) id: u32,
 }
 
+// A grid of longitude and latitude, two triangles a cell. Instances are the two balls as the first
+// camera sees them, and then as the second does; both stand at z = 0.5 and look along -z.
 @vertex
-fn vertex(@builtin(vertex_index) i: u32) -> Vertex {
-    let ndc = vec2f(f32(i & 1u), f32(i >> 1u)) * 4.0 - 1.0;
-    return Vertex(vec4f(ndc, 0.0, 1.0), ndc);
+fn vertex(@builtin(vertex_index) i: u32, @builtin(instance_index) instance: u32) -> Surface {
+    let corner = vec2u(i % 2u, (i % 6u + 1u) / 3u % 2u);
+    let cell = vec2u(i / 6u % COLUMNS, i / 6u / COLUMNS) + corner;
+    let angles = vec2f(cell) * vec2f(2.0 * PI / f32(COLUMNS), PI / f32(ROWS));
+    let across = vec2f(cos(angles.x), sin(angles.x)) * sin(angles.y);
+    let normal = vec3f(across.x, cos(angles.y), across.y);
+    let id = 1u - instance % 2u;
+    let world = select(vec3f(0.05, -0.03, 0.1) + 0.03 * normal, 0.09 * normal, id == 1u);
+    let camera = instance / 2u;
+    let view = world - vec3f(-0.04 * f32(camera), 0.0, 0.5);
+    return Surface(vec4f(view.xy / tan(0.5 * FOV[camera]), NEAR, -view.z), world, normal, id);
 }
 
 struct GBuffer {
-    @location(0) irradiance: vec4f, // alpha: 0 off skin, the cosine to the camera on it
-    @location(1) id: u32,
-    @location(2) lit: vec4f,
-    @builtin(frag_depth) depth: f32,
-}
-
-fn ball(ray: vec3f, centre: vec3f, radius: f32) -> f32 {
-    let b = dot(ray, centre);
-    let d = b * b - dot(centre, centre) + radius * radius;
-    return select(1e9, b - sqrt(max(d, 0.0)), d > 0.0);
+    @location(0) light: vec4f, // diffuse irradiance; alpha is the id, to be read back with it
+    @location(1) picture: vec4f, // where the result goes
+    @location(2) id: u32, // 1: the first profile of the plan
 }
 
 @fragment
-fn fragment(in: Vertex) -> GBuffer {
-    let ray = normalize(vec3f(in.ndc / vec2f(scale_x, scale_y), -1.0));
-    let skin_centre = vec3f(-0.02, 0.0, -0.6);
-    let grey_centre = vec3f(0.05, -0.03, -0.5);
-    let t = vec3f(ball(ray, skin_centre, 0.09), ball(ray, grey_centre, 0.03), select(1e9, -0.1 / ray.y, ray.y < 0.0));
-    let nearest = min(min(t.x, t.y), t.z);
-    if nearest > 2.0 {
-        discard;
-    }
-    let p = nearest * ray;
-    let is_skin = nearest == t.x;
-    var normal = vec3f(0.0, 1.0, 0.0);
-    var albedo = vec3f(0.3, 0.5, 0.7);
-    if is_skin {
-        normal = normalize(p - skin_centre);
-        albedo = vec3f(0.8, 0.6, 0.5);
-    } else if nearest == t.y {
-        normal = normalize(p - grey_centre);
-    }
-    let sun = select(0.0, 0.85, p.x + 0.3 * p.y > -0.03); // a hard edge
-    let e = vec3f(0.05 + sun * max(dot(normal, normalize(vec3f(0.4, 0.5, 0.8))), 0.0));
-    let cosine = select(0.0, -dot(normal, ray), is_skin);
-    return GBuffer(vec4f(e, cosine), u32(is_skin), vec4f(e * albedo, 0.5), -near / p.z);
+fn fragment(in: Surface) -> GBuffer {
+    let sun = select(0.0, 0.85, in.world.x + 0.3 * in.world.y > -0.03);
+    let facing = max(dot(normalize(in.normal), normalize(vec3f(0.4, 0.5, 0.8))), 0.0);
+    let light = vec4f(vec3f(0.05 + sun * facing), f32(in.id));
+    return GBuffer(light, light, in.id);
 }
