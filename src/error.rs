@@ -6,7 +6,8 @@ use wgpu::{TextureFormat, TextureUsages};
 
 use crate::Viewport;
 
-/// An input that cannot be used. Each names the input by the name of its field.
+/// An input that cannot be used. Its `Display` is a sentence that names the field, such as "depth: size: got
+/// 8x8, needs 16x8 as the irradiance has"; print it with `{}`.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Error {

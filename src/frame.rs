@@ -5,8 +5,8 @@ use wgpu::{BlendComponent, BlendState, ColorTargetState, ColorWrites, TextureFor
 /// One frame of a deferred renderer, seen by one camera.
 ///
 /// All textures are two-dimensional, single-sampled, of one size (that of the irradiance), and have the
-/// usage `TEXTURE_BINDING`. Views show mip level 0 of one layer in the texture's own format; wgpu does not
-/// tell, so this is not checked. Start from [`Frame::new`] and set what you have:
+/// usage `TEXTURE_BINDING`. Views are two-dimensional, of mip level 0 and of any one layer, in the texture's
+/// own format; wgpu does not tell, so this is not checked. Start from [`Frame::new`] and set what you have:
 ///
 /// ```
 /// # fn frame(irradiance: &wgpu::TextureView, depth: &wgpu::TextureView, id: &wgpu::TextureView) {
@@ -27,8 +27,8 @@ pub struct Frame<'a> {
     pub depth: &'a TextureView,
     /// View space to clip space, column by column (`to_cols_array_2d` in glam): right-handed, y up, depth
     /// from 0 to 1, as wgpu has it. Perspective or orthographic; forward, reversed or infinite depth;
-    /// off-centre and jittered. Conventions of OpenGL (depth from −1) and Vulkan (y down) cannot be told
-    /// from others and give wrong results.
+    /// off-centre and jittered. In glam 0.34 these are the functions of `camera::rh::proj::directx`. Those of
+    /// `opengl` (depth from −1) and `vulkan` (y down) cannot be told from others and give wrong results.
     pub projection: [[f32; 4]; 4],
     /// Length of a scene unit in mm. Default: 1000, a scene in metres.
     pub mm_per_unit: f32,
@@ -42,7 +42,8 @@ pub struct Frame<'a> {
     pub strength: Option<&'a TextureView>,
     /// Albedo, linear RGB, that multiplies what is added by [`Output::AddScattered`] and
     /// [`Output::AddDifference`], so that paint stays sharp. The irradiance is then without albedo.
-    /// Default, `None`: 1, for an irradiance that has the albedo in it.
+    /// [`Output::Scattered`] refuses it, since its result is multiplied by albedo after the effect. Default,
+    /// `None`: 1, for an irradiance that has the albedo in it.
     pub albedo: Option<&'a TextureView>,
     /// The rectangle of all these textures that `projection` fills. Nothing outside is read or written.
     /// Default, `None`: all.
@@ -74,8 +75,10 @@ pub enum Output {
     /// Rgba16Float, or Rgba32Float on devices that blend it.
     AddScattered(TextureFormat),
     /// What scattering changes, times [`Frame::albedo`], added to the target: for one that has the diffuse
-    /// light already, so that a frame without the effect is right, too. Red, green and blue alone; what
-    /// does not scatter is not touched. Formats as for `AddScattered`.
+    /// light already, so that a frame without the effect is right, too. What is added may be negative.
+    /// The target cannot be the irradiance itself: the host draws its diffuse light twice, once alone and
+    /// once with all else. Red, green and blue alone; what does not scatter is not touched. Formats as for
+    /// `AddScattered`.
     AddDifference(TextureFormat),
 }
 

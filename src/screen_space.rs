@@ -79,9 +79,12 @@ impl ScreenSpace {
 /// What one camera needs to scatter its frames: scratch textures, and the numbers of its last frame.
 ///
 /// Two calls a frame. [`prepare`](Self::prepare) checks the inputs and uploads; [`render`](Self::render)
-/// records. Views that share a submission must be views of their own, since the numbers of a frame are
-/// uploaded when it is prepared. A view may change its effect from frame to frame, to toggle plans; it keeps
-/// the scratch of a pyramid and that of the exact sum once it was prepared for each. Drop it to free them.
+/// records. Take a view for each such pair in a submission: a second `prepare` before the submit replaces the
+/// numbers of the first, and one camera is then blurred at the scale of another, without an error.
+///
+/// A view may change its effect from frame to frame, to toggle plans. It keeps the scratch of a pyramid and
+/// that of the exact sum once it was prepared for each; drop it to free them. What was recorded stays valid
+/// when a view is dropped, or prepared anew after the submit.
 #[derive(Debug, Default)]
 pub struct View {
     pyramid: Option<PyramidView>,
