@@ -24,6 +24,9 @@ const STEPS = 12u;
 // Furthest taps, in pixels of a level: at 75° a Gaussian is cut off.
 const REACH = 6.0;
 
+// A Gaussian of no more weight is not summed: its part goes to the narrower one beside it, or stays.
+const LEAST_WEIGHT = 0.004;
+
 // Weights are max(1 − r²/8v, 0)², whose variance is v: near to a Gaussian, and 0 beyond √8 σ.
 const CUT = 8.0;
 
@@ -72,11 +75,11 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
         if step.variances.y > 0.0 {
             w1 = weight_at(scale, step.slot + 1u);
         }
-        let has_second = any(w1 > vec3f(0.004));
+        let has_second = any(w1 > vec3f(LEAST_WEIGHT));
         if !has_second {
             w0 += w1;
         }
-        if !has_second && all(w0 <= vec3f(0.004)) {
+        if !has_second && all(w0 <= vec3f(LEAST_WEIGHT)) {
             g.light += w0 * e;
             g.weight += w0;
             continue;

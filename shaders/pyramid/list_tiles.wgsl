@@ -42,6 +42,22 @@ fn contents_around(grid: vec4u, tile: vec2i) -> Contents {
     return held;
 }
 
+// What the tiles of the level before hold, of which this tile is made, and those around them: as far as taps
+// reach.
+fn contents_in_reach(l: u32, tile: vec2i) -> Contents {
+    if l == 0u {
+        return contents_around(grids[0], tile);
+    }
+    var held = Contents();
+    for (var i = 0; i < 16; i++) {
+        let one = contents_of(grids[l - 1u], 2 * tile + vec2i(i & 3, i >> 2u) - 1);
+        held.marks |= one.marks;
+        held.brightest = max(held.brightest, one.brightest);
+        held.darkest = max(held.darkest, one.darkest);
+    }
+    return held;
+}
+
 // What pixels without skin are taken for.
 const HOLES = 1.0;
 
@@ -89,7 +105,7 @@ fn list_tiles(@builtin(global_invocation_id) at: vec3u) {
     }
     if l == 0u && doubt(near, l) > view.general_limit {
         list[view.first_direct + atomicAdd(&draws[DIRECT].instances, 1u)] = word;
-    } else if countOneBits(around.marks & PROFILES) > 1u || doubt(around, l) > view.planar_limit {
+    } else if countOneBits(around.marks & PROFILES) > 1u || doubt(contents_in_reach(l, tile), l) > view.planar_limit {
         let end = grid.z + grid.x * grid.y - 1u;
         list[end - atomicAdd(&draws[CLASSES * l + GENERAL].instances, 1u)] = word;
     } else {
