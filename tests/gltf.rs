@@ -761,6 +761,7 @@ fn views_find_the_face_of_a_body_in_any_pose() {
         ("T", [out, out]),
         ("one arm ahead", [ahead, down]),
         ("both arms ahead", [ahead, ahead]),
+        ("both arms ahead, level", [Vec3::new(0.05, 0.02, 1.0); 2]),
         ("one arm up", [down, up]),
         ("both arms up", [up, up]),
     ];
