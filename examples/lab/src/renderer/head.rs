@@ -55,7 +55,7 @@ impl Head {
     }
 }
 
-fn points<'a>(primitives: Vec<&'a Primitive>) -> impl Iterator<Item = Vec3> {
+fn points(primitives: Vec<&Primitive>) -> impl Iterator<Item = Vec3> {
     let vertices = primitives.into_iter().flat_map(|p| &p.vertices);
     vertices.map(|v| Vec3::from(v.position))
 }
