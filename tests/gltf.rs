@@ -81,6 +81,7 @@ fn rigged(model: &mut Model, bind: Mat4, nodes: Value) {
 fn a_rigged_mesh_stands_as_its_joints_have_it() {
     let one = Mat4::IDENTITY;
     let up = Mat4::from_rotation_x(std::f32::consts::FRAC_PI_2);
+    let half = std::f32::consts::FRAC_1_SQRT_2; // of a quarter turn, as a quaternion
     let cases = [
         (
             "plain",
@@ -103,7 +104,7 @@ fn a_rigged_mesh_stands_as_its_joints_have_it() {
         (
             "lying, but for its bind matrix",
             up,
-            json!([{"mesh": 0, "skin": 0}, {"rotation": [-0.70710678, 0, 0, 0.70710678]}]),
+            json!([{"mesh": 0, "skin": 0}, {"rotation": [-half, 0, 0, half]}]),
             UNIT,
         ),
         (
@@ -761,6 +762,7 @@ fn views_find_the_face_of_a_body_in_any_pose() {
         ("T", [out, out]),
         ("one arm ahead", [ahead, down]),
         ("both arms ahead", [ahead, ahead]),
+        ("both arms ahead, level", [Vec3::new(0.05, 0.02, 1.0); 2]),
         ("one arm up", [down, up]),
         ("both arms up", [up, up]),
     ];

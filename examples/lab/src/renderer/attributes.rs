@@ -166,7 +166,7 @@ impl Reader<'_> {
                     "existing joints",
                 ));
             }
-            shares.push((joints, weights));
+            shares.push([joints, weights]);
         }
         Ok(Some(Rig {
             matrices,
@@ -183,14 +183,14 @@ struct Rig {
     /// Whether the joint is the head's or hangs from it.
     is_head: Vec<bool>,
     /// Joints and their weights for each vertex, four at a time.
-    shares: Vec<(Vec<[f32; 4]>, Vec<[f32; 4]>)>,
+    shares: Vec<[Vec<[f32; 4]>; 2]>,
 }
 
 impl Rig {
     /// A vertex's transform, and how much of it is the head's, 0 to 1; \[glTF\] 3.7.3.3. None without weights.
     fn at(&self, vertex: usize) -> Option<(Mat4, f32)> {
         let (mut sum, mut head, mut total) = (Mat4::ZERO, 0.0, 0.0);
-        for (joints, weights) in &self.shares {
+        for [joints, weights] in &self.shares {
             for (joint, weight) in joints[vertex].into_iter().zip(weights[vertex]) {
                 sum += self.matrices[joint as usize] * weight;
                 head += if self.is_head[joint as usize] {

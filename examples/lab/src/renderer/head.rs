@@ -55,7 +55,7 @@ impl Head {
     }
 }
 
-fn points<'a>(primitives: Vec<&'a Primitive>) -> impl Iterator<Item = Vec3> {
+fn points(primitives: Vec<&Primitive>) -> impl Iterator<Item = Vec3> {
     let vertices = primitives.into_iter().flat_map(|p| &p.vertices);
     vertices.map(|v| Vec3::from(v.position))
 }
@@ -185,13 +185,11 @@ fn by_shape(scene: &Scene) -> Option<(Vec3, Vec3)> {
         let mut next = Vec::new();
         for &section in plane {
             let meets = |l: &&Limb| l.now.0.x <= section.1.x && section.0.x <= l.now.1.x;
-            let above = limbs
-                .iter()
-                .filter(meets)
-                .max_by(|a, b| a.widest.total_cmp(&b.widest));
-            let mut limb = above.copied().unwrap_or(Limb::new(section));
-            heads.extend(above.and_then(|_| limb.grow(section)));
-            next.push(limb);
+            let mut met: Vec<Limb> = limbs.iter().filter(meets).copied().collect();
+            heads.extend(met.iter_mut().filter_map(|limb| limb.grow(section)));
+            // Limbs that meet go on as the widest of them.
+            let widest = met.into_iter().max_by(|a, b| a.widest.total_cmp(&b.widest));
+            next.push(widest.unwrap_or(Limb::new(section)));
         }
         limbs = next;
     }
