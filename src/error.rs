@@ -111,6 +111,9 @@ pub enum Error {
     },
     /// A view that was rendered before it was prepared.
     NotPrepared,
+    /// An [`Overlay`](crate::Overlay) of a view that was last prepared by the exact sum, which has no pyramid
+    /// to show.
+    NoPyramid,
     /// A text that is not of the form that it should have.
     #[cfg(feature = "json")]
     Json {
@@ -185,6 +188,7 @@ impl fmt::Display for Error {
                 )
             }
             Self::NotPrepared => write!(f, "view: got render, needs prepare before it"),
+            Self::NoPyramid => write!(f, "view: got the exact sum, needs a plan to show what it does"),
             #[cfg(feature = "json")]
             Self::Json { input, got, needs } => write!(f, "{input}: got \"{got}\", needs {needs}"),
         }

@@ -33,6 +33,7 @@ mod exact;
 mod frame;
 mod gpu;
 mod optics;
+mod overlay;
 #[cfg(feature = "physics")]
 pub mod physics;
 pub mod plan;
@@ -46,6 +47,7 @@ mod wgsl;
 
 pub use error::Error;
 pub use frame::{Frame, Output, Viewport};
+pub use overlay::{Overlay, Show};
 pub use plan::{DEFAULT_MAX_ERROR, Plan};
 pub use profile::{Gaussian, Profile};
 pub use screen_space::{ScreenSpace, View};

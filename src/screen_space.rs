@@ -8,7 +8,7 @@ use wgpu::{CommandEncoder, Device, QuerySet, Queue, TextureView};
 use crate::exact::{self, Exact, ExactView};
 use crate::gpu::Recorder;
 use crate::optics::Optics;
-use crate::pyramid::{Pyramid, PyramidView};
+use crate::pyramid::{Pyramid, PyramidView, Seen};
 use crate::{Error, Frame, Output, Plan, validate};
 
 /// Scattering as a post-process: a [`Plan`] made ready for a device and an [`Output`].
@@ -174,6 +174,16 @@ impl View {
         first_query: u32,
     ) -> Result<Vec<String>, Error> {
         self.record(encoder, output, Some((queries, first_query)))
+    }
+
+    /// What an overlay shows of the frame that was last prepared.
+    pub(crate) fn seen(&self) -> Result<Seen<'_>, Error> {
+        let Prepared { effect, size, .. } = self.prepared.as_ref().ok_or(Error::NotPrepared)?;
+        match (&effect.shared.passes, &self.pyramid) {
+            (Passes::Pyramid(pyramid), Some(view)) => pyramid.seen(view, *size),
+            _ => None,
+        }
+        .ok_or(Error::NoPyramid)
     }
 
     fn record(

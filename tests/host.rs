@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use glam::{DMat4, DVec3, DVec4, Mat4};
 use subsurface::wgpu::{self, CommandEncoder, TextureFormat, TextureView};
 use subsurface::{Frame, Output, Plan, Profile, ScreenSpace, Viewport};
+use subsurface_lab::renderer::Gpu;
 use subsurface_lab::synthetic::{View, gpu, plane, sphere};
 use subsurface_lab::truth::closed_form::step;
 
@@ -275,7 +276,8 @@ fn one_effect_serves_frames_that_change() {
 /// Two plans, two sizes and two views by turns. Scratch textures follow the sizes.
 #[test]
 fn no_pipeline_is_made_from_frame_to_frame() {
-    let gpu = gpu();
+    // A device of its own, since it counts for all tests at once.
+    let gpu = &Gpu::headless().unwrap();
     let scenes = [Scene::new(), Scene::new().within_more()];
     let upload = |scene: &Scene| {
         let size = scene.size;
