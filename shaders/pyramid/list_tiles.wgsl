@@ -81,6 +81,25 @@ fn doubt(held: Contents, l: u32) -> f32 {
     return min(bend, 2.0) * (bitcast<f32>(held.brightest) - bitcast<f32>(~held.darkest));
 }
 
+// How a tile with skin is blurred.
+fn class_of(tile: vec2i, l: u32) -> u32 {
+    let around = contents_around(grids[l], tile);
+    if l == 0u {
+        var near = contents_of(grids[0], tile);
+        if has_odd_pixels() {
+            near = around;
+        }
+        if doubt(near, 0u) > view.general_limit {
+            return DIRECT;
+        }
+    }
+    let mixes = countOneBits(around.marks & PROFILES) > 1u;
+    if mixes || doubt(contents_in_reach(l, tile), l) > view.planar_limit {
+        return GENERAL;
+    }
+    return PLANAR;
+}
+
 // One thread a tile: lists those with skin that need their level, or are next to one that does.
 @compute @workgroup_size(8, 8)
 fn list_tiles(@builtin(global_invocation_id) at: vec3u) {
@@ -99,16 +118,13 @@ fn list_tiles(@builtin(global_invocation_id) at: vec3u) {
         return;
     }
     let word = (at.y << 16u) | at.x;
-    var near = middle;
-    if has_odd_pixels() {
-        near = around;
-    }
-    if l == 0u && doubt(near, l) > view.general_limit {
-        list[view.first_direct + atomicAdd(&draws[DIRECT].instances, 1u)] = word;
-    } else if countOneBits(around.marks & PROFILES) > 1u || doubt(contents_in_reach(l, tile), l) > view.planar_limit {
-        let end = grid.z + grid.x * grid.y - 1u;
-        list[end - atomicAdd(&draws[CLASSES * l + GENERAL].instances, 1u)] = word;
+    let class = class_of(tile, l);
+    let place = atomicAdd(&draws[CLASSES * l + class].instances, 1u);
+    if class == DIRECT {
+        list[view.first_direct + place] = word;
+    } else if class == GENERAL {
+        list[grid.z + grid.x * grid.y - 1u - place] = word;
     } else {
-        list[grid.z + atomicAdd(&draws[CLASSES * l + PLANAR].instances, 1u)] = word;
+        list[grid.z + place] = word;
     }
 }

@@ -1,8 +1,6 @@
 // What an effect sees of a frame, over the host's own picture. Follows surface.wgsl, host.wgsl and
 // list_tiles.wgsl.
 
-@group(0) @binding(3) var<storage, read> weights: array<vec4f>;
-
 // `Show` of src/overlay.rs.
 const PX_PER_MM = 0u;
 const LEVEL = 1u;

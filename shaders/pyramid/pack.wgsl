@@ -1,10 +1,7 @@
 // The frame as the pyramid has it: light and area, and where the surface is; and what its tiles hold, which
 // says how they can be blurred. A workgroup is a tile. Follows surface.wgsl.
 
-@group(0) @binding(3) var<storage, read> weights: array<vec4f>;
 @group(0) @binding(4) var irradiance: texture_2d<f32>;
-@group(0) @binding(5) var depth: texture_2d<f32>;
-@group(0) @binding(6) var profile_id: texture_2d<u32>;
 @group(0) @binding(7) var packed_light: texture_storage_2d<rgba16float, write>;
 @group(0) @binding(8) var packed_shape: texture_storage_2d<rg32uint, write>;
 // As in list_tiles.wgsl: of each level columns and rows of tiles, and where they begin.
@@ -23,16 +20,6 @@ var<workgroup> darkest: atomic<u32>;
 // Whether light is a number. By its bits, since compilers may take for granted that it is.
 fn is_finite(light: vec3f) -> bool {
     return all((bitcast<vec3u>(light) & vec3u(0x7f800000u)) != vec3u(0x7f800000u));
-}
-
-fn depth_at(pixel: vec2i) -> f32 {
-    return textureLoad(depth, vec2i(view.first_pixel) + pixel, 0).r;
-}
-
-fn z_at(pixel: vec2i) -> f32 {
-    let d = depth_at(pixel);
-    let c = view.depth_to_mm;
-    return (c.x * d + c.y) / (c.z * d + c.w);
 }
 
 fn is_inside(pixel: vec2i) -> bool {
@@ -71,16 +58,6 @@ fn tangent(pixel: vec2i, step: vec2i, sides: vec2f, mm: f32) -> f32 {
     return select(0.0, clamp(dz / mm, -STEEPEST, STEEPEST), abs(known) < STEEPEST * mm);
 }
 
-// The coarsest level that a pixel at z of a profile is blurred at.
-fn coarsest_level(z: f32, id: u32) -> u32 {
-    let mm = abs(view.step.xy * z + view.step.zw);
-    // A slope is blurred at finer levels than a surface that faces the camera; what is narrower
-    // across a ray, or in a pixel that is not square, by less than two rows at coarser ones.
-    let row = ceil((-log2(max(mm.x, mm.y)) - view.first_octave) * ROWS_PER_OCTAVE) + 2.0;
-    let i = u32(clamp(row, 0.0, f32(view.rows - 1u)));
-    return u32(weights[((id - 1u) * view.rows + i) * view.stride].w);
-}
-
 // How difficult the surface at a pixel is, a bit each for .03, .125, .5 and 2: second differences of depth
 // over the mm of a pixel, of which a level has twice as many as the one before.
 fn difficulty_bits(bend: f32) -> u32 {
@@ -91,16 +68,13 @@ fn difficulty_bits(bend: f32) -> u32 {
 // Packs a pixel of the viewport, and adds what it holds to what its tile does.
 fn pack(pixel: vec2i) {
     let pixel_of_host = vec2i(view.first_pixel) + pixel;
-    var id = 1u;
-    if view.has_id != 0u {
-        id = textureLoad(profile_id, pixel_of_host, 0).r;
-    }
-    let z = z_at(pixel);
-    // Infinitely far away there is no surface.
-    if id == 0u || id > view.profiles || !(abs(z) < 3e38) || depth_at(pixel) == view.far {
+    let here = host_surface(pixel);
+    if here.id == 0u || here.id > view.profiles {
         atomicOr(&marks, NOT_SKIN);
         return;
     }
+    let id = here.id;
+    let z = here.z;
     let last = vec2i(view.size) - 1;
     let left = z_at(vec2i(max(pixel.x - 1, 0), pixel.y));
     let right = z_at(vec2i(min(pixel.x + 1, last.x), pixel.y));

@@ -15,6 +15,7 @@ use crate::gpu::{self, Recorder};
 use crate::optics::Optics;
 use crate::plan::Weights;
 use crate::{Error, Frame, Output};
+pub(crate) use passes::OVERLAY;
 use passes::{LIGHT, OverTiles, Passes};
 use scratch::{CLASSES, DRAW_BYTES, Scratch};
 
@@ -57,6 +58,18 @@ struct Groups {
     level: Vec<BindGroup>,
     frame: BindGroup,
     copy: BindGroup,
+}
+
+/// What an [`Overlay`](crate::Overlay) reads.
+pub(crate) struct Seen<'a> {
+    pub(crate) size: [u32; 2],
+    pub(crate) viewport: Option<Viewport>,
+    pub(crate) view: &'a Buffer,
+    pub(crate) weights: &'a Buffer,
+    pub(crate) grids: &'a Buffer,
+    pub(crate) contents: &'a Buffer,
+    pub(crate) depth: &'a TextureView,
+    pub(crate) profile_id: &'a TextureView,
 }
 
 /// What is bound of a host's.
@@ -272,6 +285,21 @@ impl Pyramid {
             ),
             read,
         }
+    }
+
+    /// What an overlay reads of the frame, of `size` pixels, that was last prepared.
+    pub(crate) fn seen<'a>(&'a self, view: &'a PyramidView, size: [u32; 2]) -> Option<Seen<'a>> {
+        let groups = view.groups.as_ref()?;
+        Some(Seen {
+            size,
+            viewport: groups.viewport,
+            view: &view.scratch.view,
+            weights: &self.weights,
+            grids: &view.scratch.grids,
+            contents: &view.scratch.contents,
+            depth: &groups.read.depth,
+            profile_id: &groups.read.profile_id,
+        })
     }
 
     /// Records the frame that was last prepared.

@@ -22,13 +22,17 @@ macro_rules! wgsl {
 }
 const SURFACE: &str = wgsl!("surface");
 const BLUR: &str = wgsl!("blur");
-pub(super) const PACK: &[&str] = &[SURFACE, wgsl!("pack")];
-pub(super) const LIST_TILES: &[&str] = &[SURFACE, wgsl!("list_tiles")];
+const HOST: &str = wgsl!("host");
+const TILES: &str = wgsl!("list_tiles");
+pub(super) const PACK: &[&str] = &[SURFACE, HOST, wgsl!("pack")];
+pub(super) const LIST_TILES: &[&str] = &[SURFACE, TILES];
 const DOWNSAMPLE: &[&str] = &[SURFACE, wgsl!("downsample")];
 pub(super) const PLANAR: &[&str] = &[SURFACE, BLUR, wgsl!("planar")];
 const GENERAL: &[&str] = &[SURFACE, BLUR, wgsl!("general")];
 pub(super) const DIRECT: &[&str] = &[SURFACE, BLUR, wgsl!("direct")];
 const COPY: &[&str] = &[SURFACE, wgsl!("copy")];
+/// Of [`Overlay`](crate::Overlay).
+pub(crate) const OVERLAY: &[&str] = &[SURFACE, HOST, TILES, wgsl!("overlay")];
 
 #[derive(Debug)]
 pub(super) struct Compute {
