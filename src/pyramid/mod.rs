@@ -18,10 +18,11 @@ use crate::{Error, Frame, Output};
 use passes::{LIGHT, OverTiles, Passes};
 use scratch::{CLASSES, DRAW_BYTES, Scratch};
 
-/// How far planar blurs may be off in a tile by its looks (`doubt` of list_tiles.wgsl), over the error of the
-/// plan, for it to be planar, and to be general. Found on heads: beyond these, errors grow; below, only the work.
-const PLANAR_LIMIT: f32 = 180.0;
-const GENERAL_LIMIT: f32 = 150.0;
+/// What doubt (`list_tiles.wgsl`) there may be in a tile for it to be planar. Found on heads: beyond, errors grow.
+const PLANAR_LIMIT: f32 = 0.7;
+/// What doubt, over the error of the plan and at most in all, there may be for it not to be summed directly.
+const GENERAL_LIMIT_ERRORS: f32 = 150.0;
+const GENERAL_LIMIT: f32 = 0.8;
 
 /// The passes of a plan, and its weights.
 #[derive(Debug)]
@@ -155,8 +156,8 @@ impl Pyramid {
             profiles: plan.profiles.len() as u32,
             first_pixel: frame.rectangle().first(),
             size: size.into(),
-            planar_limit: PLANAR_LIMIT * plan.predicted_error(),
-            general_limit: GENERAL_LIMIT * plan.predicted_error(),
+            planar_limit: PLANAR_LIMIT,
+            general_limit: GENERAL_LIMIT.min(GENERAL_LIMIT_ERRORS * plan.predicted_error()),
             levels: view.scratch.levels.len() as u32 - 1,
             first_direct: view.scratch.tile_count,
         };
