@@ -74,7 +74,7 @@ struct Textures {
 impl Pyramid {
     /// # Errors
     /// A device that allows less than WebGPU's default limits.
-    pub fn new(device: &Device, output: Output, plan: &Weights) -> Result<Self, Error> {
+    pub(crate) fn new(device: &Device, output: Output, plan: &Weights) -> Result<Self, Error> {
         let limits = device.limits();
         for (limit, got, needs) in [
             (
@@ -120,12 +120,12 @@ impl Pyramid {
     }
 
     /// Bytes of scratch memory of a view of so many pixels.
-    pub fn scratch_bytes(&self, size: [u32; 2]) -> u64 {
+    pub(crate) fn scratch_bytes(&self, size: [u32; 2]) -> u64 {
         scratch::bytes(size, &self.plan)
     }
 
     /// Uploads the numbers of a frame. Makes anew what a change of its size, or of its textures, asks for.
-    pub fn prepare(
+    pub(crate) fn prepare(
         &self,
         device: &Device,
         queue: &Queue,
@@ -276,7 +276,7 @@ impl Pyramid {
     }
 
     /// Records the frame that was last prepared.
-    pub fn render(&self, recorder: &mut Recorder, view: &PyramidView, output: &TextureView) {
+    pub(crate) fn render(&self, recorder: &mut Recorder, view: &PyramidView, output: &TextureView) {
         let PyramidView { scratch, groups } = view;
         let (Some(groups), [base, coarser @ ..]) = (groups, &scratch.levels[..]) else {
             return;
