@@ -19,10 +19,11 @@ pub(crate) use passes::OVERLAY;
 use passes::{LIGHT, OverTiles, Passes};
 use scratch::{CLASSES, DRAW_BYTES, Scratch};
 
-/// How far planar blurs may be off in a tile by its looks (`doubt` of list_tiles.wgsl), over the error of the
-/// plan, for it to be planar, and to be general. Found on heads: beyond these, errors grow; below, only the work.
-const PLANAR_LIMIT: f32 = 180.0;
-const GENERAL_LIMIT: f32 = 150.0;
+/// What doubt (`list_tiles.wgsl`) there may be in a tile for it to be planar. Found on heads: beyond, errors grow.
+const PLANAR_LIMIT: f32 = 0.7;
+/// What doubt, over the error of the plan and at most in all, there may be for it not to be summed directly.
+const GENERAL_LIMIT_ERRORS: f32 = 150.0;
+const GENERAL_LIMIT: f32 = 0.8;
 
 /// The passes of a plan, and its weights.
 #[derive(Debug)]
@@ -86,7 +87,7 @@ struct Textures {
 impl Pyramid {
     /// # Errors
     /// A device that allows less than WebGPU's default limits.
-    pub fn new(device: &Device, output: Output, plan: &Weights) -> Result<Self, Error> {
+    pub(crate) fn new(device: &Device, output: Output, plan: &Weights) -> Result<Self, Error> {
         let limits = device.limits();
         for (limit, got, needs) in [
             (
@@ -132,12 +133,12 @@ impl Pyramid {
     }
 
     /// Bytes of scratch memory of a view of so many pixels.
-    pub fn scratch_bytes(&self, size: [u32; 2]) -> u64 {
+    pub(crate) fn scratch_bytes(&self, size: [u32; 2]) -> u64 {
         scratch::bytes(size, &self.plan)
     }
 
     /// Uploads the numbers of a frame. Makes anew what a change of its size, or of its textures, asks for.
-    pub fn prepare(
+    pub(crate) fn prepare(
         &self,
         device: &Device,
         queue: &Queue,
@@ -168,8 +169,8 @@ impl Pyramid {
             profiles: plan.profiles.len() as u32,
             first_pixel: frame.rectangle().first(),
             size: size.into(),
-            planar_limit: PLANAR_LIMIT * plan.predicted_error(),
-            general_limit: GENERAL_LIMIT * plan.predicted_error(),
+            planar_limit: PLANAR_LIMIT,
+            general_limit: GENERAL_LIMIT.min(GENERAL_LIMIT_ERRORS * plan.predicted_error()),
             levels: view.scratch.levels.len() as u32 - 1,
             first_direct: view.scratch.tile_count,
         };
@@ -303,7 +304,7 @@ impl Pyramid {
     }
 
     /// Records the frame that was last prepared.
-    pub fn render(&self, recorder: &mut Recorder, view: &PyramidView, output: &TextureView) {
+    pub(crate) fn render(&self, recorder: &mut Recorder, view: &PyramidView, output: &TextureView) {
         let PyramidView { scratch, groups } = view;
         let (Some(groups), [base, coarser @ ..]) = (groups, &scratch.levels[..]) else {
             return;

@@ -60,7 +60,7 @@ pub(super) struct Passes {
 }
 
 impl Passes {
-    pub fn new(device: &Device, plan: &Weights, output: Output) -> Self {
+    pub(super) fn new(device: &Device, plan: &Weights, output: Output) -> Self {
         let compute = |entry: &str, files: &[&str], bindings: &[(u32, BindingType)]| {
             let label = format!("subsurface::pyramid {entry}");
             let module = gpu::module(device, &label, files);

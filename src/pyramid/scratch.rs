@@ -153,7 +153,7 @@ pub(super) fn bytes(size: [u32; 2], plan: &Weights) -> u64 {
 }
 
 impl Scratch {
-    pub fn new(device: &Device, queue: &Queue, size: [u32; 2], plan: &Weights) -> Self {
+    pub(super) fn new(device: &Device, queue: &Queue, size: [u32; 2], plan: &Weights) -> Self {
         let words = |label: &str, count: u32, usage| {
             device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(label),
@@ -258,7 +258,7 @@ impl Scratch {
     }
 
     /// Uploads what the blurs of each level are by this plan.
-    pub fn set_plan(&self, queue: &Queue, plan: &Weights) {
+    pub(super) fn set_plan(&self, queue: &Queue, plan: &Weights) {
         let last = self.levels.len() - 1;
         for (l, level) in self.levels.iter().enumerate() {
             let settings = level_settings(plan, l, last, level);
@@ -268,7 +268,7 @@ impl Scratch {
     }
 
     /// Where the mean of level `l` goes, from 1 on.
-    pub fn mean(&self, l: usize) -> &TextureView {
+    pub(super) fn mean(&self, l: usize) -> &TextureView {
         &self.means[(l + 1) % 2]
     }
 }
