@@ -24,15 +24,13 @@ impl Head {
     /// whichever is there; all skin, of a head or a bust.
     pub fn of(scene: &Scene) -> Self {
         let whole = scene.skin_bounds();
-        let size = |(min, max): (Vec3, Vec3)| (max - min).length();
         // Each with how much of its height below it is chin and neck.
         let found = by_joints(scene)
             .map(|head| (head, 0.25))
             .or_else(|| by_names(scene).map(|head| (head, 0.0)))
             .or_else(|| by_features(scene).map(|head| (head, 0.0)))
             .or_else(|| by_shape(scene).map(|head| (head, 0.45)));
-        let is_part = |size_of_head: f32| size_of_head > 0.0 && size_of_head < PART * size(whole);
-        let found = found.filter(|(head, _)| is_part(size(*head)));
+        let found = found.filter(|(head, _)| is_part(*head, whole));
         let ((mut min, max), below) = found.unwrap_or((whole, 0.0));
         min.y -= below * (max.y - min.y);
         let forward = forward(scene, (min, max)).unwrap_or(Vec3::Z);
@@ -53,6 +51,11 @@ impl Head {
         let foremost = here.max_by(|a, b| a.dot(self.forward).total_cmp(&b.dot(self.forward)));
         foremost.unwrap_or(middle)
     }
+}
+
+fn is_part((min, max): (Vec3, Vec3), whole: (Vec3, Vec3)) -> bool {
+    let size = (max - min).length();
+    size > 0.0 && size < PART * (whole.1 - whole.0).length()
 }
 
 fn points(primitives: Vec<&Primitive>) -> impl Iterator<Item = Vec3> {
@@ -193,7 +196,8 @@ fn by_shape(scene: &Scene) -> Option<(Vec3, Vec3)> {
         }
         limbs = next;
     }
-    heads.retain(Limb::is_head);
+    // Not a whole trunk down to its waist.
+    heads.retain(|limb| limb.is_head() && is_part(limb.head, (min, max)));
     let head = heads.iter().max_by(|a, b| a.widest.total_cmp(&b.widest))?;
     Some(head.head)
 }
