@@ -207,7 +207,18 @@ impl GBuffer {
                     area_mm2: self.steps[*i][0].cross(self.steps[*i][1]).length() as f32,
                     irradiance: hit.irradiance.as_vec3(),
                 },
-                steps_mm: self.steps[*i].map(|step| step.as_vec3()),
+                steps_mm: truth::even_steps(
+                    self.steps[*i].map(|step| step.as_vec3()),
+                    self.pixels_mm2[*i].sqrt() as f32,
+                    |x, y| {
+                        let [width, height] = self.view.size.map(|s| s as i32);
+                        let (x, y) = (*i as i32 % width + x, *i as i32 / width + y);
+                        let is_inside = (0..width).contains(&x) && (0..height).contains(&y);
+                        let found = is_inside.then(|| self.hits[(y * width + x) as usize]);
+                        let found = found.flatten().filter(|h| h.id == 1)?;
+                        Some((found.point - hit.point).as_vec3())
+                    },
+                ),
             })
             .collect();
         let place = |i| on_surface.partition_point(|(j, _)| j < i);

@@ -31,8 +31,8 @@ impl Layer {
         match self {
             Self::None => "no scattering",
             Self::Texture => "texture space",
-            Self::Screen => "screen space, planned",
-            Self::Exact => "screen space, exact",
+            Self::Screen => "screen space, a plan",
+            Self::Exact => "screen space, exact sum",
             Self::Width => "kernel width",
             Self::Level => "level of the plan",
         }

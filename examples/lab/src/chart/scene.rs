@@ -9,7 +9,7 @@ use subsurface::{Frame, Profile};
 use crate::renderer::{
     Camera, Gpu, Lighting, Primitive, Probe, Renderer, Scene as Model, View, Visible,
 };
-use crate::truth::{Patch, Pixel, closed_form};
+use crate::truth::{Patch, Pixel, closed_form, even_steps};
 
 /// σ of red light in the skin profile, in mm, by which the edges are named.
 const RED_SIGMA_MM: f64 = 1.176;
@@ -133,18 +133,23 @@ impl Scene {
             .map(|id| *id == 1)
             .collect();
         let irradiance = gpu.read(&g.irradiance);
+        let view = camera.view();
+        let mm_per_px = 2.0 * (camera.fov_y / 2.0).tan() / size[1] as f32;
         if !skin.contains(&true) {
             return Err(Error::new(name, "no skin in view", "a model that scatters"));
         }
         let pixels = (0..skin.len()).filter(|i| skin[*i]).map(|i| {
             let Visible { point_mm, steps_mm } = visible[i];
+            let depth_mm = -view.transform_point3(point_mm / mm_per_unit).z * mm_per_unit;
+            let beside =
+                |x, y| Some(visible[skin_beside(&skin, size, i, x, y)?].point_mm - point_mm);
             Pixel {
                 patch: Patch {
                     point_mm,
                     area_mm2: steps_mm[0].cross(steps_mm[1]).length(),
                     irradiance: rgb(irradiance[i]),
                 },
-                steps_mm,
+                steps_mm: even_steps(steps_mm, depth_mm * mm_per_px, beside),
             }
         });
         Ok(Self {
@@ -210,6 +215,15 @@ fn a_third(gpu: &Gpu, model: &Model, mm_per_unit: f32, size: [u32; 2]) -> Result
         camera.fov_y = 2.0 * half.atan();
     }
     Ok(camera)
+}
+
+/// The pixel so many columns and rows beside one, where it is skin.
+fn skin_beside(skin: &[bool], size: [u32; 2], i: usize, x: i32, y: i32) -> Option<usize> {
+    let [width, height] = size.map(|s| s as i32);
+    let (x, y) = (i as i32 % width + x, i as i32 / width + y);
+    let is_inside = (0..width).contains(&x) && (0..height).contains(&y);
+    let there = (y * width + x) as usize;
+    (is_inside && skin[there]).then_some(there)
 }
 
 /// From so far away that a pixel is a third of a centimetre.
@@ -308,7 +322,7 @@ fn orthographic(
         DVec4::new(0.0, 0.0, 1.0, 1.0),
     );
     let (mut irradiance, mut depth, mut id) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut skin, mut pixels, mut known) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut skin, mut hits) = (Vec::new(), Vec::new());
     for y in 0..size[1] {
         for x in 0..size[0] {
             let at = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) / px_per_mm - half;
@@ -321,24 +335,35 @@ fn orthographic(
             }));
             id.push(u8::from(found.is_some()));
             skin.push(found.is_some());
-            if let Some(h) = found {
-                // On the tangent plane, down being −y in mm.
-                let step = |x: f64, y: f64| {
-                    let z = -(x * h.normal.x + y * h.normal.y) / h.normal.z;
-                    DVec3::new(x, y, z) / px_per_mm
-                };
-                let steps = [step(1.0, 0.0), step(0.0, -1.0)];
-                pixels.push(Pixel {
-                    patch: Patch {
-                        point_mm: h.point_mm.as_vec3(),
-                        area_mm2: steps[0].cross(steps[1]).length() as f32,
-                        irradiance: Vec3::splat(f16::from_bits(bits[0]).to_f32()),
-                    },
-                    steps_mm: steps.map(|step| step.as_vec3()),
-                });
-                known.push(h.scattered.as_vec3());
-            }
+            hits.push(found);
         }
+    }
+    let (mut pixels, mut known) = (Vec::new(), Vec::new());
+    for (i, h) in hits.iter().enumerate() {
+        let Some(h) = h else { continue };
+        // On the tangent plane, down being −y in mm.
+        let step = |x: f64, y: f64| {
+            let z = -(x * h.normal.x + y * h.normal.y) / h.normal.z;
+            DVec3::new(x, y, z) / px_per_mm
+        };
+        let tangents = [step(1.0, 0.0), step(0.0, -1.0)];
+        let beside = |x, y| {
+            let there = hits[skin_beside(&skin, size, i, x, y)?].as_ref()?;
+            Some((there.point_mm - h.point_mm).as_vec3())
+        };
+        pixels.push(Pixel {
+            patch: Patch {
+                point_mm: h.point_mm.as_vec3(),
+                area_mm2: tangents[0].cross(tangents[1]).length() as f32,
+                irradiance: Vec3::splat(f16::from_bits(irradiance[i][0]).to_f32()),
+            },
+            steps_mm: even_steps(
+                tangents.map(|t| t.as_vec3()),
+                px_per_mm.recip() as f32,
+                beside,
+            ),
+        });
+        known.push(h.scattered.as_vec3());
     }
     Scene {
         irradiance: gpu.upload("irradiance", size, TextureFormat::Rgba16Float, &irradiance),

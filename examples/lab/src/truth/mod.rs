@@ -19,7 +19,7 @@ mod visible;
 pub use cloud::Patch;
 pub use random_walk::{Walk, random_walk};
 pub use surface::{Place, SurfaceIntegral, Triangles, surface_integral};
-pub use visible::{Pixel, visible_integral};
+pub use visible::{Pixel, even_steps, visible_integral};
 
 /// Is told each share of the work as it is done, from any thread; the shares sum to 1.
 pub type Progress<'a> = &'a (dyn Fn(f64) + Sync);

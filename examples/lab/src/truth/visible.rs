@@ -12,9 +12,31 @@ use super::cloud::{Cloud, Kernel, Patch};
 pub struct Pixel {
     /// The surface that it shows: irradiance as the frame has it, area on the tangent plane.
     pub patch: Patch,
-    /// ∂p/∂x and ∂p/∂y: the way on its tangent plane to where the next pixel in the row, and in the column,
-    /// looks.
+    /// The way to the surface of the next pixel in the row, and in the column: [`even_steps`].
     pub steps_mm: [Vec3; 2],
+}
+
+/// ∂p/∂x and ∂p/∂y, the way on the tangent plane to where the next pixel in the row and in the column looks,
+/// where the surface goes on evenly. Where it bends within a pixel, or ends, its lattice is not known, and that
+/// of a surface facing the camera stands in, `facing_mm` between pixels. `beside` has the ways to the surface
+/// of the pixels beside, by columns and rows, where they are of the same profile.
+pub fn even_steps(
+    tangents_mm: [Vec3; 2],
+    facing_mm: f32,
+    beside: impl Fn(i32, i32) -> Option<Vec3>,
+) -> [Vec3; 2] {
+    /// Of a step, what a neighbour may lie off the end of it.
+    const EVEN: f32 = 0.25;
+    let is_even = |step: Vec3, x: i32, y: i32| {
+        [1, -1].into_iter().all(|side| {
+            let found = beside(side * x, side * y);
+            found.is_some_and(|way| way.distance(side as f32 * step) <= EVEN * step.length())
+        })
+    };
+    match is_even(tangents_mm[0], 1, 0) && is_even(tangents_mm[1], 0, 1) {
+        true => tangents_mm,
+        false => [Vec3::X, Vec3::Y].map(|step| facing_mm * step),
+    }
 }
 
 /// Σᵢ wᵢ ∫ E Gᵢ dA / ∫ Gᵢ dA over what the camera sees: every pixel summed for every pixel, no taps,
@@ -58,10 +80,6 @@ struct Lattice {
     spacing_mm: [f64; 2],
 }
 
-/// Rows that look farther apart than so many of their points, beyond 75°, are not told from a surface that
-/// bends within a pixel, whose rows are not: they are taken to be so far apart.
-const FARTHEST_ROWS: f64 = 4.0;
-
 impl Lattice {
     fn new(steps_mm: [Vec3; 2]) -> Self {
         let [mut a, mut b] = steps_mm.map(|step| step.as_dvec3());
@@ -80,10 +98,9 @@ impl Lattice {
         }
         let along = a.normalize_or_zero();
         let across = b - along * b.dot(along);
-        let spacing = a.length();
         Self {
             axes: [along, across.normalize_or_zero()],
-            spacing_mm: [spacing, across.length().min(FARTHEST_ROWS * spacing)],
+            spacing_mm: [a.length(), across.length()],
         }
     }
 
@@ -187,6 +204,21 @@ mod tests {
                 .max_element()
         };
         asked.iter().zip(&found).map(error).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_lattice_is_known_where_the_surface_goes_on_evenly() {
+        let tangents = [Vec3::X, Vec3::new(0.0, 1.0, 3.0)];
+        let plane = |x: i32, y: i32| x as f32 * tangents[0] + y as f32 * tangents[1];
+        let facing = [Vec3::X * 0.5, Vec3::Y * 0.5];
+        assert_eq!(
+            even_steps(tangents, 0.5, |x, y| Some(plane(x, y))),
+            tangents
+        );
+        let bends = |x, y| Some(plane(x, y) + Vec3::Z * (x * x) as f32);
+        assert_eq!(even_steps(tangents, 0.5, bends), facing);
+        let ends = |x, y| (y < 1).then(|| plane(x, y));
+        assert_eq!(even_steps(tangents, 0.5, ends), facing);
     }
 
     #[test]

@@ -24,13 +24,13 @@ const METHODS: [Style; 11] = [
     style(COPY, "copy", "#777777", Marker::Cross),
     style(
         "screen_exact",
-        "screen space, exact",
+        "screen space, exact sum",
         "#222222",
         Marker::Diamond,
     ),
     style(
         "screen_planned",
-        "screen space, planned",
+        "screen space, a plan",
         "#0072b2",
         Marker::Circle,
     ),
