@@ -118,11 +118,11 @@ fn list_tiles(@builtin(global_invocation_id) at: vec3u) {
         return;
     }
     let word = (at.y << 16u) | at.x;
-    let class = class_of(tile, l);
-    let place = atomicAdd(&draws[CLASSES * l + class].instances, 1u);
-    if class == DIRECT {
+    let kind = class_of(tile, l);
+    let place = atomicAdd(&draws[CLASSES * l + kind].instances, 1u);
+    if kind == DIRECT {
         list[view.first_direct + place] = word;
-    } else if class == GENERAL {
+    } else if kind == GENERAL {
         list[grid.z + grid.x * grid.y - 1u - place] = word;
     } else {
         list[grid.z + place] = word;

@@ -43,10 +43,10 @@ fn fs_overlay(shown: Shown) -> @location(0) vec4f {
     } else if shown.show == LEVEL {
         color = heat(f32(coarsest_level(here.z, here.id)) / 8.0);
     } else if shown.show == CLASS_OF_TILE {
-        let class = class_of(vec2i(pixel) / i32(TILE), 0u);
-        if class == PLANAR {
+        let kind = class_of(vec2i(pixel) / i32(TILE), 0u);
+        if kind == PLANAR {
             color = vec3f(0.0, 0.6, 0.0);
-        } else if class == GENERAL {
+        } else if kind == GENERAL {
             color = vec3f(0.9, 0.7, 0.0);
         } else {
             color = vec3f(0.9, 0.0, 0.0);
