@@ -87,8 +87,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let gpu = Gpu::headless()?;
     let frame = made_up_frame(&gpu);
     let unrolled = made_up_atlas(&gpu);
-    let [on_screen, on_atlas] = ["scattered", "scattered atlas"]
-        .map(|name| gpu.target(name, SIZE, TextureFormat::Rgba16Float));
+    let [on_screen, on_atlas] =
+        ["scattered", "scattered atlas"].map(|name| gpu.target(name, SIZE, TextureFormat::Rgba16Float));
     let mut skin = Skin::new(&gpu.device)?;
     let mut atlas = SkinAtlas::new(&gpu.device)?;
     let (device, queue) = (&gpu.device, &gpu.queue);

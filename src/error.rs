@@ -132,15 +132,10 @@ impl fmt::Display for Error {
             Self::Format { input, got, needs } => {
                 write!(f, "{input}: format: got {got:?}, needs {needs}")
             }
-            Self::OutputFormat { got, needs } => write!(
-                f,
-                "output: format: got {got:?}, needs {needs:?} as the effect was made for"
-            ),
-            Self::Texture {
-                input,
-                dimension,
-                samples,
-            } => write!(
+            Self::OutputFormat { got, needs } => {
+                write!(f, "output: format: got {got:?}, needs {needs:?} as the effect was made for")
+            }
+            Self::Texture { input, dimension, samples } => write!(
                 f,
                 "{input}: got a {dimension:?} texture with {samples} samples, needs a D2 texture with 1 sample"
             ),
@@ -152,10 +147,9 @@ impl fmt::Display for Error {
                 "{input}: size: got {}x{}, needs {}x{} as the irradiance has",
                 got[0], got[1], needs[0], needs[1]
             ),
-            Self::OutputIsInput { input } => write!(
-                f,
-                "output: got the texture of {input}, needs a texture of its own"
-            ),
+            Self::OutputIsInput { input } => {
+                write!(f, "output: got the texture of {input}, needs a texture of its own")
+            }
             Self::Viewport { got, size } => write!(
                 f,
                 "viewport: got {}x{} at {}, {}, needs a rectangle within {}x{}",
@@ -182,10 +176,7 @@ impl fmt::Display for Error {
                 "albedo: got a texture, needs none for Output::Scattered, which is multiplied by albedo after it"
             ),
             Self::Limit { limit, got, needs } => {
-                write!(
-                    f,
-                    "device: {limit}: got {got}, needs {needs}, a default of WebGPU"
-                )
+                write!(f, "device: {limit}: got {got}, needs {needs}, a default of WebGPU")
             }
             Self::NotPrepared => write!(f, "view: got render, needs prepare before it"),
             Self::NoPyramid => write!(f, "view: got the exact sum, needs a plan to show what it does"),

@@ -92,9 +92,7 @@ impl Output {
     /// The format of the target.
     pub fn format(self) -> TextureFormat {
         match self {
-            Self::Scattered(format) | Self::AddScattered(format) | Self::AddDifference(format) => {
-                format
-            }
+            Self::Scattered(format) | Self::AddScattered(format) | Self::AddDifference(format) => format,
         }
     }
 
@@ -116,26 +114,15 @@ impl Output {
         };
         ColorTargetState {
             format: self.format(),
-            blend: self.adds().then_some(BlendState {
-                color: sum,
-                alpha: sum,
-            }),
-            write_mask: if self.adds() {
-                ColorWrites::COLOR
-            } else {
-                channels
-            },
+            blend: self.adds().then_some(BlendState { color: sum, alpha: sum }),
+            write_mask: if self.adds() { ColorWrites::COLOR } else { channels },
         }
     }
 }
 
 impl<'a> Frame<'a> {
     /// A frame of these three, all else at its default.
-    pub fn new(
-        irradiance: &'a TextureView,
-        depth: &'a TextureView,
-        projection: [[f32; 4]; 4],
-    ) -> Self {
+    pub fn new(irradiance: &'a TextureView, depth: &'a TextureView, projection: [[f32; 4]; 4]) -> Self {
         Self {
             irradiance,
             depth,
@@ -170,12 +157,7 @@ impl<'a> Frame<'a> {
     /// The rectangle that is looked at.
     pub(crate) fn rectangle(&self) -> Viewport {
         let [width, height] = self.size();
-        self.viewport.unwrap_or(Viewport {
-            x: 0,
-            y: 0,
-            width,
-            height,
-        })
+        self.viewport.unwrap_or(Viewport { x: 0, y: 0, width, height })
     }
 }
 

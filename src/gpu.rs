@@ -3,8 +3,8 @@
 
 use wgpu::{
     BindGroup, BindGroupLayout, BindGroupLayoutEntry, BindingResource, BindingType, Buffer,
-    BufferBindingType, BufferUsages, ColorTargetState, CommandEncoder, Device, QuerySet,
-    RenderPipeline, ShaderModule, ShaderStages, TextureFormat, TextureSampleType, TextureView,
+    BufferBindingType, BufferUsages, ColorTargetState, CommandEncoder, Device, QuerySet, RenderPipeline,
+    ShaderModule, ShaderStages, TextureFormat, TextureSampleType, TextureView,
 };
 
 /// A texture that passes hand to each other.
@@ -16,11 +16,7 @@ pub(crate) fn scratch_texture(
 ) -> TextureView {
     let texture = device.create_texture(&wgpu::TextureDescriptor {
         label: Some(label),
-        size: wgpu::Extent3d {
-            width: size[0],
-            height: size[1],
-            depth_or_array_layers: 1,
-        },
+        size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
@@ -43,12 +39,7 @@ pub(crate) fn uniform_buffer<T>(device: &Device, label: &str) -> Buffer {
 
 /// A buffer that holds these bytes, as many as a multiple of four. On a device that is lost it holds
 /// nothing, where wgpu's own helper panics.
-pub(crate) fn filled_buffer(
-    device: &Device,
-    label: &str,
-    contents: &[u8],
-    usage: BufferUsages,
-) -> Buffer {
+pub(crate) fn filled_buffer(device: &Device, label: &str, contents: &[u8], usage: BufferUsages) -> Buffer {
     let buffer = device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size: contents.len() as u64,
@@ -74,8 +65,7 @@ pub(crate) fn module(device: &Device, label: &str, files: &[&str]) -> ShaderModu
 /// A texture that shaders load floats from; depth formats are floats, too.
 pub(crate) const FLOATS: BindingType = texture_type(TextureSampleType::Float { filterable: false });
 /// A texture that shaders filter.
-pub(crate) const FILTERED: BindingType =
-    texture_type(TextureSampleType::Float { filterable: true });
+pub(crate) const FILTERED: BindingType = texture_type(TextureSampleType::Float { filterable: true });
 /// A texture that shaders load unsigned integers from.
 pub(crate) const UINTS: BindingType = texture_type(TextureSampleType::Uint);
 /// A linear sampler.
@@ -105,11 +95,7 @@ const fn texture_type(sample_type: TextureSampleType) -> BindingType {
 }
 
 const fn buffer_type(ty: BufferBindingType) -> BindingType {
-    BindingType::Buffer {
-        ty,
-        has_dynamic_offset: false,
-        min_binding_size: None,
-    }
+    BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
 }
 
 /// A layout of bindings, each with its number and type, for these stages. Vertices do not write, by WebGPU's
@@ -144,16 +130,9 @@ pub(crate) fn group(
 ) -> BindGroup {
     let entries: Vec<_> = resources
         .iter()
-        .map(|(binding, resource)| wgpu::BindGroupEntry {
-            binding: *binding,
-            resource: resource.clone(),
-        })
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding: *binding, resource: resource.clone() })
         .collect();
-    device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some(label),
-        layout,
-        entries: &entries,
-    })
+    device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
 }
 
 /// How a render pipeline is made.
@@ -176,10 +155,8 @@ impl Draw<'_> {
             bind_group_layouts: &[Some(self.layout)],
             immediate_size: 0,
         });
-        let options = || wgpu::PipelineCompilationOptions {
-            constants: self.constants,
-            ..Default::default()
-        };
+        let options =
+            || wgpu::PipelineCompilationOptions { constants: self.constants, ..Default::default() };
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.label),
             layout: Some(&layout),
@@ -189,10 +166,7 @@ impl Draw<'_> {
                 compilation_options: options(),
                 buffers: &[],
             },
-            primitive: wgpu::PrimitiveState {
-                topology: self.topology,
-                ..Default::default()
-            },
+            primitive: wgpu::PrimitiveState { topology: self.topology, ..Default::default() },
             depth_stencil: None,
             multisample: Default::default(),
             fragment: Some(wgpu::FragmentState {
@@ -240,11 +214,7 @@ pub(crate) struct Recorder<'a> {
 
 impl<'a> Recorder<'a> {
     pub(crate) fn new(encoder: &'a mut CommandEncoder, times: Option<(&'a QuerySet, u32)>) -> Self {
-        Self {
-            encoder,
-            times,
-            labels: Vec::new(),
-        }
+        Self { encoder, times, labels: Vec::new() }
     }
 
     /// The labels of all passes so far.
@@ -276,10 +246,7 @@ impl<'a> Recorder<'a> {
                 view,
                 depth_slice: None,
                 resolve_target: None,
-                ops: wgpu::Operations {
-                    load,
-                    store: wgpu::StoreOp::Store,
-                },
+                ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
             })
         };
         let attachments: Vec<_> = targets.iter().map(|view| attachment(*view)).collect();
@@ -287,12 +254,10 @@ impl<'a> Recorder<'a> {
         self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(label),
             color_attachments: &attachments,
-            timestamp_writes: queries.map(|(query_set, beginning, end)| {
-                wgpu::RenderPassTimestampWrites {
-                    query_set,
-                    beginning_of_pass_write_index: beginning,
-                    end_of_pass_write_index: end,
-                }
+            timestamp_writes: queries.map(|(query_set, beginning, end)| wgpu::RenderPassTimestampWrites {
+                query_set,
+                beginning_of_pass_write_index: beginning,
+                end_of_pass_write_index: end,
             }),
             ..Default::default()
         })
@@ -301,16 +266,13 @@ impl<'a> Recorder<'a> {
     /// Begins a pass of dispatches.
     pub(crate) fn dispatch(&mut self, label: &str) -> wgpu::ComputePass<'_> {
         let queries = self.queries(label);
-        self.encoder
-            .begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some(label),
-                timestamp_writes: queries.map(|(query_set, beginning, end)| {
-                    wgpu::ComputePassTimestampWrites {
-                        query_set,
-                        beginning_of_pass_write_index: beginning,
-                        end_of_pass_write_index: end,
-                    }
-                }),
-            })
+        self.encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some(label),
+            timestamp_writes: queries.map(|(query_set, beginning, end)| wgpu::ComputePassTimestampWrites {
+                query_set,
+                beginning_of_pass_write_index: beginning,
+                end_of_pass_write_index: end,
+            }),
+        })
     }
 }

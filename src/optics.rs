@@ -39,18 +39,11 @@ impl Optics {
             // An orthographic camera may see what is behind it, farther than what is before it.
             if w.z == 0.0 { -z } else { z.abs() }
         };
-        let far = if distance(0.0) > distance(1.0) {
-            0.0
-        } else {
-            1.0
-        };
+        let far = if distance(0.0) > distance(1.0) { 0.0 } else { 1.0 };
         let size = frame.rectangle().size();
         let mm = frame.mm_per_unit;
         let at = |ndc: f32, row: Vec4, scale: f32| {
-            [
-                (ndc * w.z - row.z) / scale,
-                (ndc * w.w - row.w) / scale * mm,
-            ]
+            [(ndc * w.z - row.z) / scale, (ndc * w.w - row.w) / scale * mm]
         };
         let step = |ndc: f32, scale: f32| [ndc * w.z / scale, ndc * w.w / scale * mm];
         let [ux, vx] = at(-1.0, x, x.x);
@@ -76,10 +69,7 @@ impl Optics {
         } else {
             return Ok(());
         };
-        Err(Error::Projection {
-            got: frame.projection,
-            needs,
-        })
+        Err(Error::Projection { got: frame.projection, needs })
     }
 
     /// z = (x·depth + y)/(z·depth + w), in mm.

@@ -75,11 +75,7 @@ impl Overlay {
             constants: &[],
         }
         .pipeline(device);
-        Ok(Self {
-            format,
-            layout,
-            pipeline,
-        })
+        Ok(Self { format, layout, pipeline })
     }
 
     /// Records `show` of the frame that `view` was last prepared for and has rendered, over `target`, which

@@ -33,10 +33,7 @@ const REACH_SIGMAS: f32 = 3.5;
 const NONE: Gaussian = gaussian(0.0, 0.0, 0.0, 0.0);
 
 const fn gaussian(variance_mm2: f32, red: f32, green: f32, blue: f32) -> Gaussian {
-    Gaussian {
-        variance_mm2,
-        weight: [red, green, blue],
-    }
+    Gaussian { variance_mm2, weight: [red, green, blue] }
 }
 
 impl Profile {
@@ -72,13 +69,7 @@ impl Profile {
                 needs: [1, Self::MAX_GAUSSIANS],
             });
         }
-        let refuse = |input: String, got: f32, needs| {
-            Err(Error::Number {
-                input,
-                got: got.into(),
-                needs,
-            })
-        };
+        let refuse = |input: String, got: f32, needs| Err(Error::Number { input, got: got.into(), needs });
         let is_valid = |x: f32| x.is_finite() && x >= 0.0;
         for (i, g) in gaussians.iter().enumerate() {
             if !is_valid(g.variance_mm2) {
@@ -97,10 +88,7 @@ impl Profile {
             let needs = "a finite sum above 0 in every colour";
             return refuse("profile: sum of the weights".into(), sum, needs);
         }
-        let mut profile = Self {
-            gaussians: [NONE; Self::MAX_GAUSSIANS],
-            len: gaussians.len(),
-        };
+        let mut profile = Self { gaussians: [NONE; Self::MAX_GAUSSIANS], len: gaussians.len() };
         for (to, from) in profile.gaussians.iter_mut().zip(gaussians) {
             *to = Gaussian {
                 variance_mm2: from.variance_mm2,
@@ -158,9 +146,7 @@ impl TryFrom<Terms> for Profile {
 #[cfg(feature = "json")]
 impl From<Profile> for Terms {
     fn from(profile: Profile) -> Self {
-        Self {
-            gaussians: profile.gaussians().to_vec(),
-        }
+        Self { gaussians: profile.gaussians().to_vec() }
     }
 }
 
@@ -169,10 +155,7 @@ mod tests {
     use super::*;
 
     fn gaussian(variance_mm2: f32, weight: f32) -> Gaussian {
-        Gaussian {
-            variance_mm2,
-            weight: [weight; 3],
-        }
+        Gaussian { variance_mm2, weight: [weight; 3] }
     }
 
     #[test]
@@ -224,16 +207,7 @@ mod tests {
         assert_eq!(profile.gaussians(), [gaussian(0.5, 1.0)]);
         for bad in ["", "[]", r#"{"gaussians": [{"variance": 1}]}"#, &text[..20]] {
             let error = Profile::from_json(bad).unwrap_err();
-            assert!(
-                matches!(
-                    error,
-                    Error::Json {
-                        input: "profile",
-                        ..
-                    }
-                ),
-                "{error}"
-            );
+            assert!(matches!(error, Error::Json { input: "profile", .. }), "{error}");
         }
     }
 }

@@ -48,13 +48,7 @@ impl ScreenSpace {
             Some(weights) => Passes::Pyramid(Pyramid::new(device, output, weights)?),
             None => Passes::Exact(Exact::new(device, output)),
         };
-        Ok(Self {
-            shared: Arc::new(Shared {
-                output,
-                plan: plan.clone(),
-                passes,
-            }),
-        })
+        Ok(Self { shared: Arc::new(Shared { output, plan: plan.clone(), passes }) })
     }
 
     /// The plan that it was made for.
@@ -123,11 +117,7 @@ impl View {
         effect: &ScreenSpace,
         frame: &Frame,
     ) -> Result<(), Error> {
-        let Shared {
-            output,
-            plan,
-            passes,
-        } = &*effect.shared;
+        let Shared { output, plan, passes } = &*effect.shared;
         validate::frame(frame, *output)?;
         let optics = Optics::new(frame)?;
         match passes {
@@ -141,11 +131,7 @@ impl View {
             }
         }
         let read = frame.textures().map(|(name, view)| (name, view.clone()));
-        self.prepared = Some(Prepared {
-            effect: effect.clone(),
-            size: frame.size(),
-            read: read.collect(),
-        });
+        self.prepared = Some(Prepared { effect: effect.clone(), size: frame.size(), read: read.collect() });
         Ok(())
     }
 

@@ -54,11 +54,7 @@ impl TextureSpace {
     /// # Errors
     /// A format that cannot be rendered to on this device; no profile, or more than
     /// [`MAX_PROFILES`](crate::MAX_PROFILES).
-    pub fn new(
-        device: &Device,
-        output_format: TextureFormat,
-        profiles: &[Profile],
-    ) -> Result<Self, Error> {
+    pub fn new(device: &Device, output_format: TextureFormat, profiles: &[Profile]) -> Result<Self, Error> {
         let output = Output::Scattered(output_format);
         validate::output(device, output)?;
         validate::profiles(profiles)?;
@@ -91,10 +87,7 @@ impl TextureSpace {
             strength: atlas.irradiance.clone(),
             albedo: atlas.irradiance.clone(),
         };
-        let settings = Settings {
-            gutter: GUTTER,
-            ..Settings::new(&self.profiles, atlas.mm_per_unit)
-        };
+        let settings = Settings { gutter: GUTTER, ..Settings::new(&self.profiles, atlas.mm_per_unit) };
         let inputs = Inputs::new(&self.profiles, textures, settings, None);
         self.sum.prepare(device, queue, sums, inputs);
         Ok(())
@@ -130,15 +123,9 @@ impl TextureSpace {
         output: &TextureView,
         times: Option<(&QuerySet, u32)>,
     ) -> Result<Vec<String>, Error> {
-        let (sums, read) = self
-            .sums
-            .as_ref()
-            .and_then(|sums| Some((sums, sums.read()?)))
-            .ok_or(Error::NotPrepared)?;
-        let inputs = [
-            ("irradiance", &read.irradiance),
-            ("positions", &read.positions),
-        ];
+        let (sums, read) =
+            self.sums.as_ref().and_then(|sums| Some((sums, sums.read()?))).ok_or(Error::NotPrepared)?;
+        let inputs = [("irradiance", &read.irradiance), ("positions", &read.positions)];
         validate::target(output, self.output, sums.size(), inputs.into_iter())?;
         let mut recorder = Recorder::new(encoder, times);
         self.sum.render(&mut recorder, sums, output);

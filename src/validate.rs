@@ -58,20 +58,12 @@ pub(crate) fn frame(frame: &Frame, output: Output) -> Result<(), Error> {
     if frame.albedo.is_some() && !output.adds() {
         return Err(Error::AlbedoUnused);
     }
-    let Viewport {
-        x,
-        y,
-        width,
-        height,
-    } = frame.rectangle();
+    let Viewport { x, y, width, height } = frame.rectangle();
     let fits = |first: u32, length: u32, size: u32| {
         length > 0 && first.checked_add(length).is_some_and(|end| end <= size)
     };
     if !fits(x, width, size[0]) || !fits(y, height, size[1]) {
-        return Err(Error::Viewport {
-            got: frame.rectangle(),
-            size,
-        });
+        return Err(Error::Viewport { got: frame.rectangle(), size });
     }
     mm_per_unit(frame.mm_per_unit)
 }
@@ -85,11 +77,7 @@ pub(crate) fn texture(
 ) -> Result<(), Error> {
     let got = view.texture().format();
     if !role.fits(got) {
-        return Err(Error::Format {
-            input,
-            got,
-            needs: role.needs(),
-        });
+        return Err(Error::Format { input, got, needs: role.needs() });
     }
     plain(input, view, TextureUsages::TEXTURE_BINDING, size)
 }
@@ -103,10 +91,7 @@ pub(crate) fn target<'a>(
 ) -> Result<(), Error> {
     let got = view.texture().format();
     if got != output.format() {
-        return Err(Error::OutputFormat {
-            got,
-            needs: output.format(),
-        });
+        return Err(Error::OutputFormat { got, needs: output.format() });
     }
     plain("output", view, TextureUsages::RENDER_ATTACHMENT, size)?;
     for (input, other) in read {
@@ -132,19 +117,11 @@ fn plain(
         });
     }
     if !texture.usage().contains(usage) {
-        return Err(Error::Usage {
-            input,
-            got: texture.usage(),
-            needs: usage,
-        });
+        return Err(Error::Usage { input, got: texture.usage(), needs: usage });
     }
     let got = [texture.width(), texture.height()];
     if got != size {
-        return Err(Error::Size {
-            input,
-            got,
-            needs: size,
-        });
+        return Err(Error::Size { input, got, needs: size });
     }
     Ok(())
 }
@@ -152,11 +129,7 @@ fn plain(
 /// Checks that there are profiles, and no more than ids can name.
 pub(crate) fn profiles(profiles: &[Profile]) -> Result<(), Error> {
     if profiles.is_empty() || profiles.len() > MAX_PROFILES {
-        return Err(Error::Count {
-            input: "profiles",
-            got: profiles.len(),
-            needs: [1, MAX_PROFILES],
-        });
+        return Err(Error::Count { input: "profiles", got: profiles.len(), needs: [1, MAX_PROFILES] });
     }
     Ok(())
 }
@@ -177,31 +150,17 @@ pub(crate) fn mm_per_unit(mm_per_unit: f32) -> Result<(), Error> {
 pub(crate) fn output(device: &wgpu::Device, output: Output) -> Result<(), Error> {
     use wgpu::TextureFormatFeatureFlags as Flags;
     let format = output.format();
-    let is_float = matches!(
-        format.sample_type(None, None),
-        Some(TextureSampleType::Float { .. })
-    );
+    let is_float = matches!(format.sample_type(None, None), Some(TextureSampleType::Float { .. }));
     let features = format.guaranteed_format_features(device.features());
-    let can_render = features
-        .allowed_usages
-        .contains(TextureUsages::RENDER_ATTACHMENT);
-    let refuse = |needs| {
-        Err(Error::Format {
-            input: "output",
-            got: format,
-            needs,
-        })
-    };
+    let can_render = features.allowed_usages.contains(TextureUsages::RENDER_ATTACHMENT);
+    let refuse = |needs| Err(Error::Format { input: "output", got: format, needs });
     if !is_float || format.components() < 3 || !can_render {
         return refuse("three or four float channels that this device renders to");
     }
     if output.adds() && !features.flags.contains(Flags::BLENDABLE) {
         return refuse("a format that this device blends, such as Rgba16Float");
     }
-    let is_signed = matches!(
-        format,
-        TextureFormat::Rgba16Float | TextureFormat::Rgba32Float
-    );
+    let is_signed = matches!(format, TextureFormat::Rgba16Float | TextureFormat::Rgba32Float);
     if output.adds() && !is_signed {
         return refuse("Rgba16Float or Rgba32Float, since what is added may be negative");
     }

@@ -106,10 +106,7 @@ fn run_twin(@builtin(workgroup_id) at: vec3u) {{
     let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
         layout: &pipeline.get_bind_group_layout(3),
-        entries: &[wgpu::BindGroupEntry {
-            binding: 0,
-            resource: buffer.as_entire_binding(),
-        }],
+        entries: &[wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
     });
     let mut encoder = device.create_command_encoder(&Default::default());
     let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -120,8 +117,6 @@ fn run_twin(@builtin(workgroup_id) at: vec3u) {{
     encoder.copy_buffer_to_buffer(&buffer, 0, &read, 0, buffer.size());
     queue.submit([encoder.finish()]);
     read.map_async(wgpu::MapMode::Read, .., |result| result.expect("mapped"));
-    device
-        .poll(wgpu::PollType::wait_indefinitely())
-        .expect("the device goes on");
+    device.poll(wgpu::PollType::wait_indefinitely()).expect("the device goes on");
     bytemuck::pod_collect_to_vec(&read.get_mapped_range(..).expect("mapped"))
 }

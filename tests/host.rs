@@ -24,13 +24,7 @@ fn plan(planned: bool) -> &'static Plan {
 }
 
 /// Scatters a frame by a new effect and a new view.
-fn record(
-    planned: bool,
-    to: Output,
-    frame: &Frame,
-    output: &TextureView,
-    encoder: &mut CommandEncoder,
-) {
+fn record(planned: bool, to: Output, frame: &Frame, output: &TextureView, encoder: &mut CommandEncoder) {
     let gpu = gpu();
     let effect = ScreenSpace::new(&gpu.device, to, plan(planned)).unwrap();
     let mut view = subsurface::View::new();
@@ -58,20 +52,13 @@ struct Asked<'a> {
 }
 
 /// At a corner of a picture that has other things all around.
-const PLACE: Viewport = Viewport {
-    x: 40,
-    y: 24,
-    width: SIZE[0],
-    height: SIZE[1],
-};
+const PLACE: Viewport = Viewport { x: 40, y: 24, width: SIZE[0], height: SIZE[1] };
 
 impl Scene {
     fn new() -> Self {
         let view = View::perspective(SIZE, 40.0);
         let light = DVec3::new(0.8, 0.3, 0.5).normalize();
-        let seen = view.shoot(sphere(9.0, 36.0, |n| {
-            DVec3::new(1.0, 0.5, 0.25) * n.dot(light).max(0.0)
-        }));
+        let seen = view.shoot(sphere(9.0, 36.0, |n| DVec3::new(1.0, 0.5, 0.25) * n.dot(light).max(0.0)));
         let hits = &seen.hits;
         let color = |e: DVec3| {
             let half = |x: f64| half::f16::from_f64(x).to_f32();
@@ -104,8 +91,7 @@ impl Scene {
             projection: self.projection,
         };
         for i in more.places() {
-            more.irradiance
-                .push(i.map_or([8.0, 8.0, 8.0, 1.0], |i| self.irradiance[i]));
+            more.irradiance.push(i.map_or([8.0, 8.0, 8.0, 1.0], |i| self.irradiance[i]));
             more.depth.push(i.map_or(0.3, |i| self.depth[i]));
             more.id.push(i.map_or(1, |i| self.id[i]));
         }
@@ -124,13 +110,7 @@ impl Scene {
     }
 
     /// What an effect leaves in a target that held `before`.
-    fn scatter(
-        &self,
-        planned: bool,
-        output: Output,
-        before: &[[f32; 4]],
-        asked: Asked,
-    ) -> Vec<[f32; 4]> {
+    fn scatter(&self, planned: bool, output: Output, before: &[[f32; 4]], asked: Asked) -> Vec<[f32; 4]> {
         let gpu = gpu();
         let to = gpu.target("output", self.size, HALF);
         let held = gpu.upload("before", self.size, HALF, &halves(before));
@@ -138,8 +118,7 @@ impl Scene {
             let [from, to] = [&held, &to].map(|view| view.texture().as_image_copy());
             encoder.copy_texture_to_texture(from, to, held.texture().size());
         });
-        let ids =
-            (!asked.no_ids).then(|| gpu.upload("id", self.size, TextureFormat::R8Uint, &self.id));
+        let ids = (!asked.no_ids).then(|| gpu.upload("id", self.size, TextureFormat::R8Uint, &self.id));
         let full = TextureFormat::Rgba32Float;
         let irradiance = gpu.upload("irradiance", self.size, full, &self.irradiance);
         let depth = gpu.upload("depth", self.size, TextureFormat::R32Float, &self.depth);
@@ -176,36 +155,23 @@ fn a_viewport_is_a_frame_of_its_own() {
     let around = [3.0, 2.0, 1.0, 0.5];
     let shares = |count: usize| (0..count).map(|i| (i * 37 % 251) as u8).collect::<Vec<_>>();
     let strength_alone = shares(alone.depth.len());
-    let strength_more: Vec<u8> = more
-        .places()
-        .iter()
-        .map(|place| place.map_or(0, |i| strength_alone[i]))
-        .collect();
-    let strength = |scene: &Scene, shares: &[u8]| {
-        gpu().upload("strength", scene.size, TextureFormat::R8Unorm, shares)
-    };
+    let strength_more: Vec<u8> =
+        more.places().iter().map(|place| place.map_or(0, |i| strength_alone[i])).collect();
+    let strength =
+        |scene: &Scene, shares: &[u8]| gpu().upload("strength", scene.size, TextureFormat::R8Unorm, shares);
     let strength_alone = strength(&alone, &strength_alone);
     let strength_more = strength(&more, &strength_more);
     for planned in [false, true] {
-        let shared = Asked {
-            strength: Some(&strength_alone),
-            ..Asked::default()
-        };
+        let shared = Asked { strength: Some(&strength_alone), ..Asked::default() };
         let truth = alone.scattered(planned, shared);
         assert!(largest_difference(&truth, &alone.irradiance) > 0.02);
         let before = vec![around; more.depth.len()];
-        let in_place = Asked {
-            viewport: Some(PLACE),
-            strength: Some(&strength_more),
-            ..Asked::default()
-        };
+        let in_place = Asked { viewport: Some(PLACE), strength: Some(&strength_more), ..Asked::default() };
         let out = more.scatter(planned, HALF.into(), &before, in_place);
         for (i, pixel) in out.iter().enumerate() {
             let (x, y) = (i as u32 % more.size[0], i as u32 / more.size[0]);
-            let inside = x >= PLACE.x
-                && y >= PLACE.y
-                && x < PLACE.x + PLACE.width
-                && y < PLACE.y + PLACE.height;
+            let inside =
+                x >= PLACE.x && y >= PLACE.y && x < PLACE.x + PLACE.width && y < PLACE.y + PLACE.height;
             let expected = match inside {
                 true => truth[((y - PLACE.y) * SIZE[0] + x - PLACE.x) as usize],
                 false => around,
@@ -235,13 +201,7 @@ fn one_effect_serves_frames_that_change() {
     };
     let frames = [
         first,
-        changed(&|f| {
-            f.viewport = Some(Viewport {
-                x: 0,
-                y: 3,
-                ..PLACE
-            })
-        }),
+        changed(&|f| f.viewport = Some(Viewport { x: 0, y: 3, ..PLACE })),
         changed(&|f| f.viewport = None),
         changed(&|f| f.mm_per_unit = 3.0),
         changed(&|f| f.profile_id = None),
@@ -310,8 +270,7 @@ fn no_pipeline_is_made_from_frame_to_frame() {
         // Each view alternates between the plans, and both between the sizes.
         let (effect, view) = (&effects[i % 2], &mut views[i / 2 % 2]);
         let frame = frame(i / 4 % 2);
-        view.prepare(&gpu.device, &gpu.queue, effect, &frame)
-            .unwrap();
+        view.prepare(&gpu.device, &gpu.queue, effect, &frame).unwrap();
         // What was dropped goes when the queue is next submitted and done.
         if i % 100 == 0 {
             gpu.run(|_| ());
@@ -343,8 +302,7 @@ fn views_share_a_submission() {
         gpu.run(|encoder| {
             for ((view, output), mm_per_unit) in views.iter_mut().zip(&outputs).zip([1.0, 3.0]) {
                 let frame = frame(mm_per_unit);
-                view.prepare(&gpu.device, &gpu.queue, &effect, &frame)
-                    .unwrap();
+                view.prepare(&gpu.device, &gpu.queue, &effect, &frame).unwrap();
                 view.render(encoder, output).unwrap();
             }
         });
@@ -361,11 +319,7 @@ fn views_share_a_submission() {
 #[test]
 fn passes_tell_their_times() {
     let gpu = gpu();
-    if !gpu
-        .device
-        .features()
-        .contains(wgpu::Features::TIMESTAMP_QUERY)
-    {
+    if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
         println!("this device takes no times");
         return;
     }
@@ -396,8 +350,7 @@ fn passes_tell_their_times() {
     for planned in [false, true] {
         let effect = ScreenSpace::new(&gpu.device, HALF, plan(planned)).unwrap();
         let mut view = subsurface::View::new();
-        view.prepare(&gpu.device, &gpu.queue, &effect, &frame)
-            .unwrap();
+        view.prepare(&gpu.device, &gpu.queue, &effect, &frame).unwrap();
         let labels = gpu.run(|encoder| {
             let labels = view.render_timed(encoder, &output, &queries, 0).unwrap();
             encoder.resolve_query_set(&queries, 0..2 * labels.len() as u32, &resolved, 0);
@@ -408,9 +361,7 @@ fn passes_tell_their_times() {
         let distinct: std::collections::BTreeSet<_> = labels.iter().collect();
         assert_eq!(distinct.len(), labels.len(), "{labels:?}");
         read.map_async(wgpu::MapMode::Read, .., |result| result.unwrap());
-        gpu.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .unwrap();
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).unwrap();
         let times: Vec<u64> = bytemuck::pod_collect_to_vec(&read.get_mapped_range(..).unwrap());
         read.unmap();
         for (label, pair) in labels.iter().zip(times.chunks(2)) {
@@ -427,10 +378,7 @@ fn passes_tell_their_times() {
 fn without_ids_all_before_the_far_plane_scatters() {
     let scene = Scene::new();
     for planned in [false, true] {
-        let no_ids = Asked {
-            no_ids: true,
-            ..Asked::default()
-        };
+        let no_ids = Asked { no_ids: true, ..Asked::default() };
         let by_id = scene.scattered(planned, Asked::default());
         let by_depth = scene.scattered(planned, no_ids);
         assert_eq!(by_id, by_depth, "planned: {planned}");
@@ -454,16 +402,8 @@ fn the_far_plane_is_told_from_the_near_one() {
     for (name, projection, far) in [
         ("forward", orthographic(0.0, -1000.0, 0.0), 1.0),
         ("reversed", orthographic(0.0, -1000.0, 1.0), 0.0),
-        (
-            "forward, sees behind",
-            orthographic(2000.0, -1000.0, 0.0),
-            1.0,
-        ),
-        (
-            "reversed, sees behind",
-            orthographic(1000.0, -1000.0, 1.0),
-            0.0,
-        ),
+        ("forward, sees behind", orthographic(2000.0, -1000.0, 0.0), 1.0),
+        ("reversed, sees behind", orthographic(1000.0, -1000.0, 1.0), 0.0),
     ] {
         let flat = Scene {
             size: SIZE,
@@ -476,19 +416,14 @@ fn the_far_plane_is_told_from_the_near_one() {
             projection,
         };
         for planned in [false, true] {
-            let by_depth = Asked {
-                no_ids: true,
-                ..Asked::default()
-            };
+            let by_depth = Asked { no_ids: true, ..Asked::default() };
             let out = flat.scattered(planned, by_depth);
             for (i, pixel) in out.iter().enumerate() {
                 let kept = *pixel == flat.irradiance[i];
                 let beyond = i % SIZE[0] as usize >= 60;
                 assert!(kept || !beyond, "{name}, planned: {planned}, pixel {i}");
             }
-            let left: Vec<usize> = (0..out.len())
-                .filter(|i| i % SIZE[0] as usize <= 50)
-                .collect();
+            let left: Vec<usize> = (0..out.len()).filter(|i| i % SIZE[0] as usize <= 50).collect();
             let pick = |all: &[[f32; 4]]| left.iter().map(|i| all[*i]).collect::<Vec<_>>();
             let changed = largest_difference(&pick(&out), &pick(&flat.irradiance));
             assert!(changed > 0.02, "{name}, planned: {planned}: {changed}");
@@ -504,10 +439,7 @@ fn strength_says_how_much() {
     let strength: Vec<u8> = (0..scene.depth.len()).map(share).collect();
     let strength = gpu().upload("strength", scene.size, TextureFormat::R8Unorm, &strength);
     for planned in [false, true] {
-        let shared = Asked {
-            strength: Some(&strength),
-            ..Asked::default()
-        };
+        let shared = Asked { strength: Some(&strength), ..Asked::default() };
         let all = scene.scattered(planned, Asked::default());
         let some = scene.scattered(planned, shared);
         for (i, pixel) in some.iter().enumerate() {
@@ -537,26 +469,15 @@ fn light_that_is_no_number_goes_no_further() {
     assert!(clean.id[first] == 1 && clean.id[second] == 1);
     dirty.irradiance[first] = [f32::NAN, 1.0, 1.0, 1.0];
     dirty.irradiance[second] = [1.0, f32::INFINITY, 1.0, 1.0];
-    let all = gpu().upload(
-        "strength",
-        SIZE,
-        TextureFormat::R8Unorm,
-        &vec![255u8; clean.id.len()],
-    );
+    let all = gpu().upload("strength", SIZE, TextureFormat::R8Unorm, &vec![255u8; clean.id.len()]);
     for planned in [false, true] {
-        let asked = || Asked {
-            strength: Some(&all),
-            ..Asked::default()
-        };
+        let asked = || Asked { strength: Some(&all), ..Asked::default() };
         let [a, b] = [&clean, &dirty].map(|s| s.scattered(planned, asked()));
         let apart = |i: &usize| ![first, second].contains(i);
         let away: Vec<usize> = (0..a.len()).filter(apart).collect();
         let pick = |out: &[[f32; 4]]| away.iter().map(|i| out[*i]).collect::<Vec<_>>();
         let (a_away, b_away) = (pick(&a), pick(&b));
-        assert!(
-            b.iter().flatten().all(|c| c.is_finite()),
-            "planned: {planned}"
-        );
+        assert!(b.iter().flatten().all(|c| c.is_finite()), "planned: {planned}");
         // Two pixels of many are missing from each sum.
         let worst = largest_difference(&a_away, &b_away);
         println!("planned: {planned}, off by {worst:.4}");
@@ -574,19 +495,15 @@ fn light_beyond_half_floats_stays_a_number() {
     bright.irradiance[second] = [1.0, -1e9, 1.0, 1.0];
     for planned in [false, true] {
         let out = bright.scattered(planned, Asked::default());
-        assert!(
-            out.iter().flatten().all(|c| c.is_finite()),
-            "planned: {planned}"
-        );
+        assert!(out.iter().flatten().all(|c| c.is_finite()), "planned: {planned}");
     }
 }
 
 #[test]
 fn sums_in_place_are_what_a_final_pass_would_add() {
     let scene = Scene::new();
-    let specular: Vec<[f32; 4]> = (0..scene.depth.len())
-        .map(|i| [i as f32 % 7.0 / 16.0, 0.25, 0.5, 0.75])
-        .collect();
+    let specular: Vec<[f32; 4]> =
+        (0..scene.depth.len()).map(|i| [i as f32 % 7.0 / 16.0, 0.25, 0.5, 0.75]).collect();
     let plus = |a: &[[f32; 4]], b: &[[f32; 4]]| -> Vec<[f32; 4]> {
         let sum = |(a, b): (&[f32; 4], &[f32; 4])| [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3]];
         a.iter().zip(b).map(sum).collect()
@@ -595,12 +512,7 @@ fn sums_in_place_are_what_a_final_pass_would_add() {
         let scattered = scene.scattered(planned, Asked::default());
         let expected = plus(&specular, &scattered);
         let lit = plus(&specular, &scene.irradiance);
-        let added = scene.scatter(
-            planned,
-            Output::AddScattered(HALF),
-            &specular,
-            Asked::default(),
-        );
+        let added = scene.scatter(planned, Output::AddScattered(HALF), &specular, Asked::default());
         let changed = scene.scatter(planned, Output::AddDifference(HALF), &lit, Asked::default());
         // Up to three roundings of half floats, or truncations, of steps of .001 from 1 to 2.
         let worst = [&added, &changed].map(|out| largest_difference(out, &expected));
@@ -608,11 +520,7 @@ fn sums_in_place_are_what_a_final_pass_would_add() {
         assert!(worst[0].max(worst[1]) <= 0.003, "{worst:?}");
         // What does not scatter is not touched.
         for (i, _) in scene.id.iter().enumerate().filter(|(_, id)| **id == 0) {
-            assert_eq!(
-                changed[i].map(f32::to_bits),
-                bits_of_half(lit[i]),
-                "planned: {planned}"
-            );
+            assert_eq!(changed[i].map(f32::to_bits), bits_of_half(lit[i]), "planned: {planned}");
         }
     }
 }
@@ -627,14 +535,10 @@ fn albedo_multiplies_what_is_added() {
     let albedo = gpu().upload("albedo", scene.size, HALF, &halves(&paint));
     let times = |a: &[f32; 4], b: &[f32; 4]| [a[0] * b[0], a[1] * b[1], a[2] * b[2], 0.5];
     for planned in [false, true] {
-        let asked = || Asked {
-            albedo: Some(&albedo),
-            ..Asked::default()
-        };
+        let asked = || Asked { albedo: Some(&albedo), ..Asked::default() };
         let scattered = scene.scattered(planned, Asked::default());
-        let painted = |light: &[[f32; 4]]| -> Vec<_> {
-            light.iter().zip(&paint).map(|(a, b)| times(a, b)).collect()
-        };
+        let painted =
+            |light: &[[f32; 4]]| -> Vec<_> { light.iter().zip(&paint).map(|(a, b)| times(a, b)).collect() };
         let wanted = painted(&scattered);
         let nothing = vec![[0.0, 0.0, 0.0, 0.5]; paint.len()];
         let lit = painted(&scene.irradiance);
@@ -682,14 +586,7 @@ fn cameras() -> Vec<Camera> {
     let (near, far) = (1.0, 10_000.0);
     let mut cameras = Vec::new();
     let mut add = |name, (projection, distance_mm): (DMat4, f64), mm_per_unit, viewport| {
-        cameras.push(Camera {
-            name,
-            size: strip,
-            projection,
-            distance_mm,
-            mm_per_unit,
-            viewport,
-        });
+        cameras.push(Camera { name, size: strip, projection, distance_mm, mm_per_unit, viewport });
     };
     let infinite = |whole, degrees| perspective(whole, degrees, 0.0, near, 0.0);
     add("10°, 720p", infinite(720.0, 10.0), 1.0, None);
@@ -698,31 +595,16 @@ fn cameras() -> Vec<Camera> {
     add("110°, 4K", infinite(2160.0, 110.0), 1.0, None);
     add("units of 1 µm", infinite(1080.0, 40.0), 1e-3, None);
     add("units of 1 m", infinite(1080.0, 40.0), 1e3, None);
-    add(
-        "off centre",
-        perspective(1080.0, 40.0, 0.0, near, 0.2),
-        1.0,
-        None,
-    );
+    add("off centre", perspective(1080.0, 40.0, 0.0, near, 0.2), 1.0, None);
     let range = far - near;
     let forward = perspective(1080.0, 40.0, -far / range, -far * near / range, 0.0);
     add("forward", forward, 1.0, None);
     let reversed = perspective(1080.0, 40.0, near / range, far * near / range, 0.0);
     add("reversed", reversed, 1.0, None);
-    add(
-        "forward infinite",
-        perspective(1080.0, 40.0, -1.0, -near, 0.0),
-        1.0,
-        None,
-    );
+    add("forward infinite", perspective(1080.0, 40.0, -1.0, -near, 0.0), 1.0, None);
     let orthographic = View::orthographic(strip, px_per_mm).projection;
     add("orthographic", (orthographic, 100.0), 1.0, None);
-    let corner = Viewport {
-        x: 31,
-        y: 17,
-        width: strip[0],
-        height: strip[1],
-    };
+    let corner = Viewport { x: 31, y: 17, width: strip[0], height: strip[1] };
     add("viewport", infinite(1080.0, 40.0), 1.0, Some(corner));
     cameras
 }
@@ -730,10 +612,7 @@ fn cameras() -> Vec<Camera> {
 impl Camera {
     /// Standard deviation of red across a line of 1 mm, in mm.
     fn line_width_mm(&self, planned: bool) -> f64 {
-        let view = View {
-            size: self.size,
-            projection: self.projection,
-        };
+        let view = View { size: self.size, projection: self.projection };
         // What is off centre is looked at where it is.
         let middle = view.ray(glam::DVec2::new(128.0, 32.0));
         let x0 = (middle.0 + middle.1 * self.distance_mm).x;
@@ -800,16 +679,10 @@ fn a_line_has_its_width_in_mm_through_every_camera() {
         let truth = (red + 1.0 / 12.0 + 0.04).sqrt();
         let most_off = if planned { 0.3 } else { 0.01 };
         for width in &widths {
-            assert!(
-                (width / truth - 1.0).abs() <= most_off,
-                "{width} mm, {truth} mm"
-            );
+            assert!((width / truth - 1.0).abs() <= most_off, "{width} mm, {truth} mm");
         }
         let least = widths.iter().copied().fold(f64::MAX, f64::min);
         let most = widths.iter().copied().fold(0.0, f64::max);
-        assert!(
-            most / least <= 1.0002,
-            "planned: {planned}: {least} to {most} mm"
-        );
+        assert!(most / least <= 1.0002, "planned: {planned}: {least} to {most} mm");
     }
 }

@@ -21,11 +21,7 @@ fn small(format: TextureFormat) -> TextureView {
 fn texture(format: TextureFormat, usage: TextureUsages, samples: u32) -> TextureView {
     let texture = gpu().device.create_texture(&wgpu::TextureDescriptor {
         label: None,
-        size: wgpu::Extent3d {
-            width: SIZE[0],
-            height: SIZE[1],
-            depth_or_array_layers: 1,
-        },
+        size: wgpu::Extent3d { width: SIZE[0], height: SIZE[1], depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: samples,
         dimension: wgpu::TextureDimension::D2,
@@ -138,12 +134,7 @@ fn what_fits_is_taken() {
         screen(|i| i.strength = Some(view(strength))).unwrap();
     }
     for [x, y, width, height] in [[0, 0, 16, 8], [15, 7, 1, 1], [3, 2, 9, 5]] {
-        let viewport = Viewport {
-            x,
-            y,
-            width,
-            height,
-        };
+        let viewport = Viewport { x, y, width, height };
         screen(|i| i.viewport = Some(viewport)).unwrap();
     }
     let sixteen = Plan::exact(&[Profile::SKIN; 16]).unwrap();
@@ -167,13 +158,9 @@ fn what_does_not_fit_is_named() {
         ("depth: format", |i| i.depth = view(F::Rgba16Float)),
         ("depth: format", |i| i.depth = view(F::R8Unorm)),
         ("depth: format", |i| i.depth = view(F::R16Float)),
-        ("profile_id: format", |i| {
-            i.profile_id = Some(view(F::R8Unorm))
-        }),
+        ("profile_id: format", |i| i.profile_id = Some(view(F::R8Unorm))),
         ("strength: format", |i| i.strength = Some(view(F::R8Uint))),
-        ("strength: format", |i| {
-            i.strength = Some(view(F::Depth32Float))
-        }),
+        ("strength: format", |i| i.strength = Some(view(F::Depth32Float))),
         ("strength: size", |i| i.strength = Some(small(F::R8Unorm))),
         ("albedo: got a texture", |i| i.albedo = Some(view(HALF))),
         ("albedo: format", |i| i.albedo = Some(view(F::R8Unorm))),
@@ -206,18 +193,8 @@ fn what_does_not_fit_is_named() {
     for (name, change) in table {
         assert_names(&screen(change).expect_err(name), name);
     }
-    for [x, y, width, height] in [
-        [0, 0, 0, 8],
-        [0, 0, 17, 8],
-        [9, 0, 8, 8],
-        [u32::MAX, 0, 2, 1],
-    ] {
-        let viewport = Viewport {
-            x,
-            y,
-            width,
-            height,
-        };
+    for [x, y, width, height] in [[0, 0, 0, 8], [0, 0, 17, 8], [9, 0, 8, 8], [u32::MAX, 0, 2, 1]] {
+        let viewport = Viewport { x, y, width, height };
         let error = screen(|i| i.viewport = Some(viewport)).unwrap_err();
         assert_names(&error, "viewport");
     }
@@ -284,14 +261,11 @@ fn a_frame_that_was_refused_leaves_the_one_before() {
     for effect in effects() {
         let mut view = subsurface::View::new();
         let good = inputs.frame();
-        view.prepare(&gpu.device, &gpu.queue, effect, &good)
-            .unwrap();
+        view.prepare(&gpu.device, &gpu.queue, effect, &good).unwrap();
         let mut bad = good;
         bad.mm_per_unit = -1.0;
-        view.prepare(&gpu.device, &gpu.queue, effect, &bad)
-            .unwrap_err();
-        gpu.run(|encoder| view.render(encoder, &inputs.output))
-            .unwrap();
+        view.prepare(&gpu.device, &gpu.queue, effect, &bad).unwrap_err();
+        gpu.run(|encoder| view.render(encoder, &inputs.output)).unwrap();
         for (i, pixel) in gpu.read(&inputs.output).iter().enumerate() {
             // Light has crossed the edge.
             let beside = (6..10).contains(&(i % SIZE[0] as usize));
@@ -306,11 +280,7 @@ fn the_atlas_is_checked_too() {
     let mut path = TextureSpace::new(&gpu.device, HALF, &[Profile::SKIN]).unwrap();
     let irradiance = view(HALF);
     let mut prepare = |positions: &TextureView, mm_per_unit: f32| {
-        let atlas = Atlas {
-            irradiance: &irradiance,
-            positions,
-            mm_per_unit,
-        };
+        let atlas = Atlas { irradiance: &irradiance, positions, mm_per_unit };
         path.prepare(&gpu.device, &gpu.queue, &atlas)
     };
     let positions = view(TextureFormat::Rgba32Float);
@@ -329,10 +299,7 @@ fn nothing_is_drawn_before_the_first_frame() {
     let output = view(HALF);
     let texture = TextureSpace::new(&gpu.device, HALF, &[Profile::SKIN]).unwrap();
     let results = gpu.run(|encoder| {
-        [
-            subsurface::View::new().render(encoder, &output),
-            texture.render(encoder, &output),
-        ]
+        [subsurface::View::new().render(encoder, &output), texture.render(encoder, &output)]
     });
     assert_eq!(results, [Err(Error::NotPrepared), Err(Error::NotPrepared)]);
 }
@@ -347,10 +314,8 @@ fn sizes_may_change_from_frame_to_frame() {
             let (irradiance, depth) = (target(HALF), target(TextureFormat::Depth32Float));
             let projection = View::perspective(size, 40.0).projection.as_mat4();
             let frame = Frame::new(&irradiance, &depth, projection.to_cols_array_2d());
-            view.prepare(&gpu.device, &gpu.queue, effect, &frame)
-                .unwrap();
-            gpu.run(|encoder| view.render(encoder, &target(HALF)))
-                .unwrap();
+            view.prepare(&gpu.device, &gpu.queue, effect, &frame).unwrap();
+            gpu.run(|encoder| view.render(encoder, &target(HALF))).unwrap();
         }
     }
 }

@@ -13,22 +13,18 @@ fn shown(mm_per_unit: f32) -> [Vec<[u8; 4]>; 4] {
     let scene = Scene::from_glb(subsurface_lab::HEAD).unwrap();
     let renderer = Renderer::new(gpu, &scene, SIZE).unwrap();
     let camera = Camera::framing(&scene, View::Front, SIZE);
-    renderer
-        .render(gpu, &camera, &Lighting::default(), mm_per_unit)
-        .unwrap();
+    renderer.render(gpu, &camera, &Lighting::default(), mm_per_unit).unwrap();
     let frame = renderer.gbuffer.frame(camera.projection(SIZE), mm_per_unit);
     let output = renderer.scattered_target(gpu);
     let format = output.texture().format();
     let effect = ScreenSpace::new(&gpu.device, format, &Plan::skin()).unwrap();
     let mut view = subsurface::View::new();
-    view.prepare(&gpu.device, &gpu.queue, &effect, &frame)
-        .unwrap();
+    view.prepare(&gpu.device, &gpu.queue, &effect, &frame).unwrap();
     gpu.run(|encoder| view.render(encoder, &output)).unwrap();
     let overlay = Overlay::new(&gpu.device, TextureFormat::Rgba8Unorm).unwrap();
     [Show::PxPerMm, Show::Level, Show::Class, Show::NoProfile].map(|show| {
         let target = gpu.target("picture", SIZE, TextureFormat::Rgba8Unorm);
-        gpu.run(|encoder| overlay.render(&gpu.device, encoder, &view, show, &target))
-            .unwrap();
+        gpu.run(|encoder| overlay.render(&gpu.device, encoder, &view, show, &target)).unwrap();
         bytemuck::pod_collect_to_vec(&gpu.read_bytes(target.texture()))
     })
 }
@@ -52,18 +48,14 @@ fn a_head_of_the_wrong_size_is_seen_at_once() {
 fn overlays_say_what_is_done() {
     let pictures = shown(1000.0);
     if let Ok(directory) = std::env::var("PICTURES") {
-        for (name, pixels) in ["px_per_mm", "level", "class", "no_profile"]
-            .iter()
-            .zip(&pictures)
-        {
+        for (name, pixels) in ["px_per_mm", "level", "class", "no_profile"].iter().zip(&pictures) {
             let bytes = pixels.iter().flat_map(|p| [p[0], p[1], p[2]]).collect();
             let picture = image::RgbImage::from_raw(SIZE[0], SIZE[1], bytes).unwrap();
             picture.save(format!("{directory}/{name}.png")).unwrap();
         }
     }
     let [_, level, class, no_profile] = &pictures;
-    let count =
-        |pixels: &[[u8; 4]], is: fn(&[u8; 4]) -> bool| pixels.iter().filter(|p| is(p)).count();
+    let count = |pixels: &[[u8; 4]], is: fn(&[u8; 4]) -> bool| pixels.iter().filter(|p| is(p)).count();
     let skin = count(no_profile, |p| p[1] > 0);
     // A front of the head, of about the third of a frame.
     assert!((15_000..40_000).contains(&skin), "{skin}");
@@ -72,10 +64,7 @@ fn overlays_say_what_is_done() {
     let general = count(class, |[r, g, _, _]| *r > 100 && *g > 60);
     let direct = count(class, |[r, g, _, _]| *r > 100 && *g < 40);
     assert_eq!(planar + general + direct, skin);
-    assert!(
-        planar > skin / 2 && direct < skin / 4,
-        "{planar} {general} {direct}"
-    );
+    assert!(planar > skin / 2 && direct < skin / 4, "{planar} {general} {direct}");
     assert_eq!(count(level, |p| p[0] > 0 || p[1] > 0 || p[2] > 0), skin);
 }
 
@@ -96,7 +85,6 @@ fn only_a_plan_can_be_shown() {
     let depth = gpu.target("depth", SIZE, TextureFormat::Depth32Float);
     let projection = subsurface_lab::synthetic::View::perspective(SIZE, 40.0).projection;
     let frame = subsurface::Frame::new(&light, &depth, projection.as_mat4().to_cols_array_2d());
-    view.prepare(&gpu.device, &gpu.queue, &effect, &frame)
-        .unwrap();
+    view.prepare(&gpu.device, &gpu.queue, &effect, &frame).unwrap();
     assert_eq!(render(&view), Err(Error::NoPyramid));
 }

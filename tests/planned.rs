@@ -28,9 +28,7 @@ fn edge_error(plan: &Plan, px_per_mm: f64, angle: f64) -> f64 {
     let view = View::orthographic([400, 400], px_per_mm);
     let across = DVec3::new(angle.to_radians().cos(), angle.to_radians().sin(), 0.0);
     let blur_mm2 = px_per_mm.powi(-2);
-    let g = view.shoot(plane(DVec3::Z, 300.0, |p| {
-        DVec3::splat(step(p.dot(across), blur_mm2))
-    }));
+    let g = view.shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(step(p.dot(across), blur_mm2))));
     let out = g.scatter_planned(plan);
     let half = DVec2::splat(200.0 / px_per_mm - REACH_MM);
     let inside = g.pixels(|h| h.point.truncate().abs().cmplt(half).all());
@@ -61,28 +59,20 @@ fn hard_edges_keep_it_too() {
     for px_per_mm in [1.5, 4.0, 8.0] {
         for angle in [0.0, 27.0, 45.0, 90.0f64] {
             let across = DVec3::new(angle.to_radians().cos(), angle.to_radians().sin(), 0.0);
-            let g = View::orthographic([300, 300], px_per_mm).shoot(plane(DVec3::Z, 300.0, |p| {
-                DVec3::splat(step(p.dot(across), 0.0))
-            }));
+            let g = View::orthographic([300, 300], px_per_mm)
+                .shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(step(p.dot(across), 0.0))));
             let out = g.scatter_planned(plan);
             let out: Vec<DVec3> = out.into_iter().map(rgb).collect();
             // Across the middle of the edge, far from the picture's border.
             let along = DVec3::new(-across.y, across.x, 0.0);
             let near = |h: &Hit| {
-                h.point.dot(along).abs() < 1.0 / px_per_mm
-                    && h.point.dot(across).abs() < 8.0 / px_per_mm
+                h.point.dot(along).abs() < 1.0 / px_per_mm && h.point.dot(across).abs() < 8.0 / px_per_mm
             };
             let pixels: Vec<usize> = g.pixels(near).iter().map(|(i, _)| *i).collect();
             let errors = g.errors(&out, &pixels);
-            let error = errors
-                .iter()
-                .map(|e| e.abs().max_element())
-                .fold(0.0, f64::max);
+            let error = errors.iter().map(|e| e.abs().max_element()).fold(0.0, f64::max);
             println!("hard, {px_per_mm} px/mm, {angle}°: {error:.5}");
-            assert!(
-                error <= f64::from(plan.max_error()),
-                "{px_per_mm} px/mm, {angle}°: {error}"
-            );
+            assert!(error <= f64::from(plan.max_error()), "{px_per_mm} px/mm, {angle}°: {error}");
         }
     }
 }
@@ -96,9 +86,7 @@ fn errors_at(
     blur_mm2: f64,
     places_mm: &[f64],
 ) -> Vec<DVec3> {
-    let g = view.shoot(plane(DVec3::Z, 300.0, |p| {
-        DVec3::splat(step(p.x + center_mm, blur_mm2))
-    }));
+    let g = view.shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(step(p.x + center_mm, blur_mm2))));
     let out = g.scatter_by(effect, |_| ());
     let [width, height] = view.size.map(|s| s as usize);
     let row = &out[height / 2 * width..][..width];
@@ -182,9 +170,7 @@ fn slopes_keep_it_while_they_are_not_steep() {
             let footprint = DVec2::new(cos, sin / tilt.to_radians().cos()).length() / px_per_mm;
             let blur_mm2 = footprint * footprint;
             let anchor = DVec3::new(0.0, 0.0, -500.0);
-            let g = view.shoot(plane(normal, 500.0, |p| {
-                DVec3::splat(step(p.dot(across), blur_mm2))
-            }));
+            let g = view.shoot(plane(normal, 500.0, |p| DVec3::splat(step(p.dot(across), blur_mm2))));
             let out = g.scatter_planned(&plans()[1]);
             let half = DVec2::splat(160.0 / px_per_mm - 9.6);
             let near = |h: &Hit| (h.point - anchor).dot(across).abs() < 6.0;
@@ -201,10 +187,7 @@ fn slopes_keep_it_while_they_are_not_steep() {
             let rms = rms(errors);
             println!("tilt {tilt}° about {axis}°, edge at {edge}°: {worst:.5}, RMS {rms:.5}");
             let error = if tilt < 45.0 { worst } else { rms };
-            assert!(
-                error <= most,
-                "{tilt}° about {axis}°, edge {edge}°: {worst}, {rms}"
-            );
+            assert!(error <= most, "{tilt}° about {axis}°, edge {edge}°: {worst}, {rms}");
         }
     }
 }
@@ -216,13 +199,10 @@ fn hard_edges_down_a_slope_are_off_by_no_more_than_the_docs_say() {
     for (tilt, most) in [(30.0, 2.0 / 255.0), (60.0, 0.025)] {
         for px_per_mm in [2.0, 4.0, 8.0] {
             let view = View::orthographic([256, 256], px_per_mm);
-            let g = view.shoot(plane(tilted_normal(tilt, 0.0), 500.0, |p| {
-                DVec3::splat(step(p.x, 0.0))
-            }));
+            let g = view.shoot(plane(tilted_normal(tilt, 0.0), 500.0, |p| DVec3::splat(step(p.x, 0.0))));
             let out = g.scatter_planned(&plans()[1]);
             let out: Vec<DVec3> = out.into_iter().map(rgb).collect();
-            let middle =
-                |h: &Hit| h.point.y.abs() < 1.0 / px_per_mm && h.point.x.abs() < 8.0 / px_per_mm;
+            let middle = |h: &Hit| h.point.y.abs() < 1.0 / px_per_mm && h.point.x.abs() < 8.0 / px_per_mm;
             let pixels: Vec<usize> = g.pixels(middle).iter().map(|(i, _)| *i).collect();
             assert!(pixels.len() > 16);
             let errors = g.errors(&out, &pixels);
@@ -240,14 +220,10 @@ fn a_sphere_is_as_near_to_eq_7_as_the_docs_say() {
     let light = DVec3::new(1.0, 0.0, 1.0).normalize();
     let truth = scattered_cosine(rho_mm, &Profile::SKIN);
     let view = View::orthographic([88, 88], 4.0);
-    let g = view.shoot(sphere(rho_mm, 300.0, |n| {
-        DVec3::splat(n.dot(light).max(0.0))
-    }));
+    let g = view.shoot(sphere(rho_mm, 300.0, |n| DVec3::splat(n.dot(light).max(0.0))));
     let out = g.scatter_planned(&plans()[1]);
     let inside = g.pixels(|h| h.normal.z > 0.35);
-    let error = rms(inside
-        .iter()
-        .map(|(i, h)| rgb(out[*i]).x - truth(h.normal.dot(light)).x));
+    let error = rms(inside.iter().map(|(i, h)| rgb(out[*i]).x - truth(h.normal.dot(light)).x));
     println!("red RMS {error:.5} where n_z > .35");
     assert!(error <= 0.004, "{error}");
 }
@@ -261,21 +237,15 @@ fn layers_leak_no_more_than_the_docs_say() {
             let near = plane(DVec3::Z, 300.0 - gap_mm, |_| DVec3::ZERO);
             let far = plane(DVec3::Z, 300.0, |_| DVec3::ONE);
             let g = View::orthographic([256, 256], 4.0).shoot(|origin, ray| {
-                near(origin, ray)
-                    .filter(|hit| hit.point.dot(across) < 0.0)
-                    .or_else(|| far(origin, ray))
+                near(origin, ray).filter(|hit| hit.point.dot(across) < 0.0).or_else(|| far(origin, ray))
             });
             let out = g.scatter_planned(&plans()[1]);
             let out: Vec<DVec3> = out.into_iter().map(rgb).collect();
-            let near =
-                |h: &Hit| h.point.dot(across).abs() < 6.0 && h.point.truncate().length() < 20.0;
+            let near = |h: &Hit| h.point.dot(across).abs() < 6.0 && h.point.truncate().length() < 20.0;
             let pixels = g.pixels(near).into_iter().step_by(97);
             let pixels: Vec<usize> = pixels.map(|(i, _)| i).collect();
             let errors = g.errors(&out, &pixels);
-            let error = errors
-                .iter()
-                .map(|e| e.abs().max_element())
-                .fold(0.0, f64::max);
+            let error = errors.iter().map(|e| e.abs().max_element()).fold(0.0, f64::max);
             println!("{gap_mm} mm, edge at {angle}°: {error:.5}");
             assert!(error <= most, "{gap_mm} mm, {angle}°: {error}");
         }
@@ -325,9 +295,8 @@ fn no_scattering_leaks_onto_another_profile() {
     // Two halves of one plane, the left of profile 1 and lit; facing, and so steep that taps reach far.
     let profiles = [Profile::SKIN; 2];
     for (tilt, max_error) in [(0.0, 0.01), (75.0, 1.0 / 255.0)] {
-        let surface = plane(tilted_normal(tilt, 0.0), 300.0, |p| {
-            DVec3::splat(f64::from(u8::from(p.x < 0.0)))
-        });
+        let surface =
+            plane(tilted_normal(tilt, 0.0), 300.0, |p| DVec3::splat(f64::from(u8::from(p.x < 0.0))));
         let g = View::orthographic([160, 96], 4.0).shoot(|origin, ray| {
             let hit = surface(origin, ray)?;
             let id = if hit.point.x < 0.0 { 1 } else { 2 };

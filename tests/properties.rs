@@ -20,11 +20,7 @@ fn is_sound<T, E: std::fmt::Display>(
         Ok(taken) => prop_assert_eq!(flaw(&taken), None),
         Err(error) => {
             let said = error.to_string();
-            prop_assert!(
-                said.contains(": got ") && said.contains(", needs "),
-                "{}",
-                said
-            );
+            prop_assert!(said.contains(": got ") && said.contains(", needs "), "{}", said);
         }
     }
     Ok(())

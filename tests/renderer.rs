@@ -15,9 +15,7 @@ struct Head {
 fn render(scene: &Scene) -> Head {
     let renderer = Renderer::new(gpu(), scene, SIZE).unwrap();
     let camera = Camera::framing(scene, View::Front, SIZE);
-    renderer
-        .render(gpu(), &camera, &Lighting::default(), 1000.0)
-        .unwrap();
+    renderer.render(gpu(), &camera, &Lighting::default(), 1000.0).unwrap();
     Head { renderer, camera }
 }
 
@@ -25,10 +23,7 @@ fn screen_space(head: &Head) -> TextureView {
     let output = head.renderer.scattered_target(gpu());
     let format = output.texture().format();
     let plan = Plan::exact(&[Profile::SKIN]).unwrap();
-    let frame = head
-        .renderer
-        .gbuffer
-        .frame(head.camera.projection(SIZE), 1000.0);
+    let frame = head.renderer.gbuffer.frame(head.camera.projection(SIZE), 1000.0);
     method::scatter(gpu(), &mut ours(&plan, format), &frame, &output).unwrap();
     output
 }
@@ -97,17 +92,9 @@ fn a_mesh_without_uvs_scatters_in_screen_space_only() {
     }
     let head = render(&scene);
     let output = head.renderer.scattered_target(gpu());
-    let error = scatter_texture(&head, 256, &output)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        error.contains("no UVs") && error.contains("TEXCOORD_0"),
-        "{error}"
-    );
-    assert_ne!(
-        gpu().read(&screen_space(&head)),
-        gpu().read(&head.renderer.gbuffer.irradiance)
-    );
+    let error = scatter_texture(&head, 256, &output).unwrap_err().to_string();
+    assert!(error.contains("no UVs") && error.contains("TEXCOORD_0"), "{error}");
+    assert_ne!(gpu().read(&screen_space(&head)), gpu().read(&head.renderer.gbuffer.irradiance));
 }
 
 #[test]
@@ -115,23 +102,16 @@ fn the_picture_shows_a_lit_head() {
     let scene = Scene::from_glb(subsurface_lab::HEAD).unwrap();
     let head = render(&scene);
     let irradiance = &head.renderer.gbuffer.irradiance;
-    let picture = head
-        .renderer
-        .compose(gpu(), irradiance, Layer::Picture, 1.0);
+    let picture = head.renderer.compose(gpu(), irradiance, Layer::Picture, 1.0);
     let skin = gpu().read_bytes(head.renderer.gbuffer.profile_id.texture());
     let mean = |half: fn(usize) -> bool| {
         let pixels = (0..skin.len()).filter(|&i| skin[i] == 1 && half(i % SIZE[0] as usize));
-        let (sum, n) = pixels.fold((0.0, 0.0), |(sum, n), i| {
-            (sum + f64::from(picture[i][0]), n + 1.0)
-        });
+        let (sum, n) = pixels.fold((0.0, 0.0), |(sum, n), i| (sum + f64::from(picture[i][0]), n + 1.0));
         sum / n
     };
     // The key light stands to the left.
     let (left, right) = (mean(|x| x < 100), mean(|x| x > 156));
-    assert!(
-        left > 1.5 * right && right > 10.0,
-        "left {left}, right {right}"
-    );
+    assert!(left > 1.5 * right && right > 10.0, "left {left}, right {right}");
 }
 
 #[test]

@@ -37,12 +37,8 @@ fn constant_irradiance_stays_constant() {
     for format in [TextureFormat::Rgba32Float, TextureFormat::Rgba16Float] {
         let out = g.scatter_all(&[Profile::SKIN], format);
         for (i, _) in g.pixels(|_| true) {
-            let error =
-                DVec3::from_slice(&out[i][..3].iter().map(|&c| c.into()).collect::<Vec<_>>()) - e;
-            assert!(
-                error.abs().max_element() <= 0.001,
-                "{format:?} pixel {i}: {error}"
-            );
+            let error = DVec3::from_slice(&out[i][..3].iter().map(|&c| c.into()).collect::<Vec<_>>()) - e;
+            assert!(error.abs().max_element() <= 0.001, "{format:?} pixel {i}: {error}");
         }
     }
 }
@@ -50,9 +46,7 @@ fn constant_irradiance_stays_constant() {
 #[test]
 fn no_width_is_the_identity() {
     let view = View::perspective([200, 160], 40.0);
-    let g = view.shoot(sphere(20.0, 90.0, |n| {
-        DVec3::new((40.0 * n.x).sin() + 1.0, n.y.abs(), 1e-3)
-    }));
+    let g = view.shoot(sphere(20.0, 90.0, |n| DVec3::new((40.0 * n.x).sin() + 1.0, n.y.abs(), 1e-3)));
     // Nothing, and a nanometre.
     for variance_mm2 in [0.0, 1e-12] {
         let out = g.scatter(&single_gaussian(variance_mm2));
@@ -72,9 +66,7 @@ fn blurred_edges_match_the_closed_form() {
             let across = direction(angle);
             // Pre-blurred by a pixel, so that the pixels can tell where the edge is.
             let blur_mm2 = px_per_mm.powi(-2);
-            let g = view.shoot(plane(DVec3::Z, 300.0, |p| {
-                DVec3::splat(step(p.dot(across), blur_mm2))
-            }));
+            let g = view.shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(step(p.dot(across), blur_mm2))));
             let out = g.scatter(&Profile::SKIN);
             let mut worst: f64 = 0.0;
             for (i, hit) in g.pixels(inside(&view, px_per_mm)) {
@@ -82,10 +74,7 @@ fn blurred_edges_match_the_closed_form() {
                 worst = worst.max((out[i] - truth).abs().max_element());
             }
             println!("{px_per_mm} px/mm, {angle}°: max error {worst:.5}");
-            assert!(
-                worst <= STEP,
-                "{px_per_mm} px/mm, {angle}°: max error {worst}"
-            );
+            assert!(worst <= STEP, "{px_per_mm} px/mm, {angle}°: max error {worst}");
         }
     }
 }
@@ -96,9 +85,7 @@ fn hard_edges_match_the_visible_sum() {
         for angle in [0.0, 27.0, 45.0] {
             let view = View::orthographic([300, 300], px_per_mm);
             let across = direction(angle);
-            let g = view.shoot(plane(DVec3::Z, 300.0, |p| {
-                DVec3::splat(step(p.dot(across), 0.0))
-            }));
+            let g = view.shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(step(p.dot(across), 0.0))));
             let out = g.scatter(&Profile::SKIN);
             let near_edge = |h: &Hit| h.point.dot(across).abs() < 3.0 / px_per_mm;
             let mut worst: f64 = 0.0;
@@ -108,10 +95,7 @@ fn hard_edges_match_the_visible_sum() {
                 worst = worst.max(error.abs().max_element());
             }
             println!("{px_per_mm} px/mm, {angle}°: max error {worst:.5}");
-            assert!(
-                worst <= STEP,
-                "{px_per_mm} px/mm, {angle}°: max error {worst}"
-            );
+            assert!(worst <= STEP, "{px_per_mm} px/mm, {angle}°: max error {worst}");
         }
     }
 }
@@ -141,9 +125,7 @@ fn slopes_match_the_closed_form() {
             let footprint = DVec2::new(cos, sin / tilt.to_radians().cos()).length() / px_per_mm;
             let blur_mm2 = footprint * footprint;
             let anchor = DVec3::new(0.0, 0.0, -500.0);
-            let g = view.shoot(plane(normal, 500.0, |p| {
-                DVec3::splat(step(p.dot(across), blur_mm2))
-            }));
+            let g = view.shoot(plane(normal, 500.0, |p| DVec3::splat(step(p.dot(across), blur_mm2))));
             let out = g.scatter(&Profile::SKIN);
             let place = |h: &Hit| (h.point - anchor).dot(across);
             let inside = inside(&view, px_per_mm);
@@ -153,10 +135,7 @@ fn slopes_match_the_closed_form() {
                 .iter()
                 .map(|(i, h)| out[*i].x - scattered_step(place(h), blur_mm2, &Profile::SKIN).x));
             println!("tilt {tilt}° about {axis}°, edge at {edge}°: red RMS {error:.5}");
-            assert!(
-                error <= at_most,
-                "tilt {tilt}° about {axis}°, edge {edge}°: {error}"
-            );
+            assert!(error <= at_most, "tilt {tilt}° about {axis}°, edge {edge}°: {error}");
         }
     }
 }
@@ -172,9 +151,7 @@ fn a_plane_in_perspective_matches_the_closed_form() {
     let wave = |p: DVec3, sign: f64| (x * p.x + sign * y * p.y).sin();
     // A Gaussian leaves e^(−vk²/2) of a wave, k being as steep as it runs on the plane.
     let left = [1.0, -1.0].map(|sign| {
-        let k2 = DVec3::new(x, sign * y, 0.0)
-            .reject_from(normal)
-            .length_squared();
+        let k2 = DVec3::new(x, sign * y, 0.0).reject_from(normal).length_squared();
         let of = |g: &Gaussian| {
             DVec3::from(g.weight.map(f64::from)) * (-0.5 * f64::from(g.variance_mm2) * k2).exp()
         };
@@ -213,24 +190,15 @@ fn a_sphere_matches_eq_7() {
     for px_per_mm in [4.0, 12.0] {
         let size = (2.2 * rho_mm * px_per_mm) as u32;
         let view = View::orthographic([size, size], px_per_mm);
-        let g = view.shoot(sphere(rho_mm, 300.0, |n| {
-            DVec3::splat(n.dot(light).max(0.0))
-        }));
+        let g = view.shoot(sphere(rho_mm, 300.0, |n| DVec3::splat(n.dot(light).max(0.0))));
         let out = g.scatter(&Profile::SKIN);
         let error = |select: &dyn Fn(&Hit) -> bool| {
-            rms(g
-                .pixels(select)
-                .iter()
-                .map(|(i, h)| out[*i].x - truth(h.normal.dot(light)).x))
+            rms(g.pixels(select).iter().map(|(i, h)| out[*i].x - truth(h.normal.dot(light)).x))
         };
         let (whole, interior) = (error(&|_| true), error(&|h| h.normal.z > 0.35));
-        let none = rms(g
-            .pixels(|_| true)
-            .iter()
-            .map(|(_, h)| h.irradiance.x - truth(h.normal.dot(light)).x));
-        println!(
-            "{px_per_mm} px/mm: red RMS {whole:.5}, n_z > .35 {interior:.5}, unscattered {none:.5}"
-        );
+        let none =
+            rms(g.pixels(|_| true).iter().map(|(_, h)| h.irradiance.x - truth(h.normal.dot(light)).x));
+        println!("{px_per_mm} px/mm: red RMS {whole:.5}, n_z > .35 {interior:.5}, unscattered {none:.5}");
         // What the hidden half contributes is missing at the rim, whatever the method: that is most
         // of the .0045 measured.
         assert!(whole <= 0.005, "whole sphere: {whole}");
@@ -242,19 +210,14 @@ fn a_sphere_matches_eq_7() {
 fn a_sphere_matches_the_visible_sum() {
     let light = DVec3::new(-0.6, 0.5, 0.62).normalize();
     let view = View::perspective([256, 256], 30.0);
-    let g = view.shoot(sphere(10.0, 45.0, |n| {
-        n.dot(light).max(0.0) * DVec3::new(1.0, 0.8, 0.6)
-    }));
+    let g = view.shoot(sphere(10.0, 45.0, |n| n.dot(light).max(0.0) * DVec3::new(1.0, 0.8, 0.6)));
     let out = g.scatter(&Profile::SKIN);
     let pixels = g.pixels(|_| true).into_iter().step_by(211);
     let pixels: Vec<usize> = pixels.map(|(i, _)| i).collect();
     let errors = g.errors(&out, &pixels);
     let red = rms(errors.iter().map(|e| e.x));
     let blue = rms(errors.iter().map(|e| e.z));
-    println!(
-        "red RMS {red:.5}, blue RMS {blue:.5} over {} pixels",
-        pixels.len()
-    );
+    println!("red RMS {red:.5}, blue RMS {blue:.5} over {} pixels", pixels.len());
     // Two passes over a sphere are not the full sum: .0016 measured, at the rim, against .0108 that
     // scattering does. Blue scatters too narrowly to see the bend.
     assert!(red <= 0.002 && blue <= 0.0001, "red {red}, blue {blue}");
@@ -270,9 +233,7 @@ fn layers_leak_what_the_visible_sum_says() {
             let near = plane(DVec3::Z, 300.0 - gap_mm, |_| DVec3::ZERO);
             let far = plane(DVec3::Z, 300.0, |_| DVec3::ONE);
             let g = view.shoot(|origin, ray| {
-                near(origin, ray)
-                    .filter(|hit| hit.point.dot(across) < 0.0)
-                    .or_else(|| far(origin, ray))
+                near(origin, ray).filter(|hit| hit.point.dot(across) < 0.0).or_else(|| far(origin, ray))
             });
             let out = g.scatter(&Profile::SKIN);
             let pixels: Vec<_> = g
@@ -290,14 +251,8 @@ fn layers_leak_what_the_visible_sum_says() {
                 }
             }
             println!("{gap_mm} mm, edge at {angle}°: max error {worst:.5}, leak {leak:.5}");
-            assert!(
-                worst <= 0.002,
-                "{gap_mm} mm, {angle}°: {worst} from the visible sum"
-            );
-            assert!(
-                gap_mm < 10.0 || leak <= 0.0005,
-                "{gap_mm} mm, {angle}°: leak {leak}"
-            );
+            assert!(worst <= 0.002, "{gap_mm} mm, {angle}°: {worst} from the visible sum");
+            assert!(gap_mm < 10.0 || leak <= 0.0005, "{gap_mm} mm, {angle}°: leak {leak}");
         }
     }
 }
@@ -305,9 +260,7 @@ fn layers_leak_what_the_visible_sum_says() {
 /// Distance in mm between a quarter and three quarters of an edge's height, across `across`: x or y.
 fn edge_width_mm(view: View, across: DVec3) -> f64 {
     let blur_mm2 = 0.3;
-    let g = view.shoot(plane(DVec3::Z, 120.0, |p| {
-        DVec3::splat(step(p.dot(across), blur_mm2))
-    }));
+    let g = view.shoot(plane(DVec3::Z, 120.0, |p| DVec3::splat(step(p.dot(across), blur_mm2))));
     let out = g.scatter(&single_gaussian(1.0));
     let [width, height] = view.size.map(|s| s as usize);
     // The middle row, or the middle column from below, since y points up.
@@ -361,15 +314,11 @@ fn every_kind_of_depth_gives_the_same() {
         let mut p = reversed.projection;
         p.z_axis.z = z;
         p.w_axis.z = offset;
-        View {
-            projection: p,
-            ..reversed
-        }
+        View { projection: p, ..reversed }
     };
     let light = DVec3::new(0.7, 0.2, 0.7).normalize();
     let scene = |view: View| {
-        view.shoot(sphere(15.0, 80.0, |n| DVec3::splat(n.dot(light).max(0.0))))
-            .scatter(&Profile::SKIN)
+        view.shoot(sphere(15.0, 80.0, |n| DVec3::splat(n.dot(light).max(0.0)))).scatter(&Profile::SKIN)
     };
     let truth = scene(reversed);
     for (name, view) in [
@@ -377,11 +326,8 @@ fn every_kind_of_depth_gives_the_same() {
         ("forward infinite", depth(-1.0, -n)),
         ("reversed", depth(n / (f - n), f * n / (f - n))),
     ] {
-        let worst = scene(view)
-            .iter()
-            .zip(&truth)
-            .map(|(a, b)| (*a - *b).abs().max_element())
-            .fold(0.0, f64::max);
+        let worst =
+            scene(view).iter().zip(&truth).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f64::max);
         println!("{name}: differs by {worst:.6}");
         // Forward depth is coarser: a float's step there is .4 µm at 80 mm.
         assert!(worst <= 5e-4, "{name}: {worst}");
@@ -399,28 +345,14 @@ fn an_off_centre_projection_gives_the_same() {
         DVec4::new(-1.0, 0.0, 0.0, 1.0),
     ) * whole.projection;
     projection.x_axis.y = 0.0;
-    let half = View {
-        size: [200, 200],
-        projection,
-    };
-    let scene = |view: View| {
-        view.shoot(sphere(6.0, 80.0, |n| {
-            DVec3::splat((20.0 * n.y).sin() + 1.0)
-        }))
-    };
+    let half = View { size: [200, 200], projection };
+    let scene = |view: View| view.shoot(sphere(6.0, 80.0, |n| DVec3::splat((20.0 * n.y).sin() + 1.0)));
     // Only where the half's own edge cuts no kernel.
-    let (all, part) = (
-        scene(whole).scatter(&Profile::SKIN),
-        scene(half).scatter(&Profile::SKIN),
-    );
+    let (all, part) = (scene(whole).scatter(&Profile::SKIN), scene(half).scatter(&Profile::SKIN));
     let mut worst: f64 = 0.0;
     for y in 0..200 {
         for x in 120..200 {
-            worst = worst.max(
-                (all[y * 400 + 200 + x] - part[y * 200 + x])
-                    .abs()
-                    .max_element(),
-            );
+            worst = worst.max((all[y * 400 + 200 + x] - part[y * 200 + x]).abs().max_element());
         }
     }
     println!("differs by {worst:.6}");
@@ -444,10 +376,7 @@ fn other_pixels_stay_bit_for_bit() {
             skin_changed += u32::from(out[0] != e.x);
             assert_eq!(out[3], 0.5, "alpha is kept");
         } else {
-            assert_eq!(
-                out.map(f32::to_bits),
-                [e.x, e.y, e.z, 0.5].map(f32::to_bits)
-            );
+            assert_eq!(out.map(f32::to_bits), [e.x, e.y, e.z, 0.5].map(f32::to_bits));
         }
     }
     assert!(skin_changed > 1000, "the skin itself scatters");
@@ -464,10 +393,7 @@ fn profiles_do_not_mix() {
         hit.id = 1 + side as u32;
         Some(hit)
     });
-    let out = g.scatter_all(
-        &[Profile::SKIN, single_gaussian(4.0)],
-        TextureFormat::Rgba32Float,
-    );
+    let out = g.scatter_all(&[Profile::SKIN, single_gaussian(4.0)], TextureFormat::Rgba32Float);
     for (i, hit) in g.pixels(|_| true) {
         for (found, before) in out[i].iter().zip(hit.irradiance.to_array()) {
             // Sums of equal terms: rounding only.

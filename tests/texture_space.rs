@@ -33,17 +33,11 @@ fn scatter(size: u32, profile: &Profile, texel: impl Fn(DVec2) -> Texel) -> Vec<
         mm_per_unit: 1000.0,
     };
     method::scatter_atlas(gpu, &mut path, &atlas, &output).unwrap();
-    gpu.read(&output)
-        .iter()
-        .map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into()))
-        .collect()
+    gpu.read(&output).iter().map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into())).collect()
 }
 
 fn center(i: usize, size: u32) -> DVec2 {
-    DVec2::new(
-        f64::from(i as u32 % size) + 0.5,
-        f64::from(i as u32 / size) + 0.5,
-    )
+    DVec2::new(f64::from(i as u32 % size) + 0.5, f64::from(i as u32 / size) + 0.5)
 }
 
 /// Texels of triangles that are a line, a point, or two at one place have no area, and next to none.
@@ -98,10 +92,7 @@ fn a_stretched_patch_matches_the_closed_form() {
             }
             println!("{name}, edge at {angle}°: max error {worst:.5}");
             // One step of eight bits.
-            assert!(
-                worst <= 1.0 / 255.0 && worst > 0.0,
-                "{name}, {angle}°: {worst}"
-            );
+            assert!(worst <= 1.0 / 255.0 && worst > 0.0, "{name}, {angle}°: {worst}");
         }
     }
 }
@@ -143,16 +134,7 @@ fn islands_do_not_run_into_each_other() {
     let texel = |t: DVec2| {
         let far = t.x > 64.0;
         let p = (t * 0.2).extend(if far { 1000.0 } else { 0.0 });
-        island(t).then(|| {
-            (
-                p,
-                if far {
-                    DVec3::ONE
-                } else {
-                    DVec3::new(0.25, 0.5, 0.0)
-                },
-            )
-        })
+        island(t).then(|| (p, if far { DVec3::ONE } else { DVec3::new(0.25, 0.5, 0.0) }))
     };
     let out = scatter(size, &Profile::SKIN, texel);
     for (i, e) in out.iter().enumerate() {
@@ -168,16 +150,11 @@ fn islands_are_dilated() {
     let size = 64;
     let inside = |t: DVec2| (t - 32.0).abs().max_element() < 16.0;
     let e = DVec3::new(0.3, 0.6, 0.9);
-    let out = scatter(size, &Profile::SKIN, |t| {
-        inside(t).then(|| ((t * 0.2).extend(0.0), e))
-    });
+    let out = scatter(size, &Profile::SKIN, |t| inside(t).then(|| ((t * 0.2).extend(0.0), e)));
     for (i, found) in out.iter().enumerate() {
         let outside = (center(i, size) - 32.0).abs().max_element() - 16.0;
         if outside < 4.0 {
-            assert!(
-                (*found - e).abs().max_element() < 1e-5,
-                "texel {i}: {found}"
-            );
+            assert!((*found - e).abs().max_element() < 1e-5, "texel {i}: {found}");
         } else {
             assert_eq!(*found, DVec3::ZERO, "texel {i}");
         }

@@ -6,8 +6,8 @@ use glam::{DMat3, DVec3, Vec3};
 use subsurface::Profile;
 use subsurface_lab::synthetic::*;
 use subsurface_lab::truth::closed_form::{
-    legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_cosine_around,
-    scattered_spot, scattered_step, step, through_slab,
+    legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_cosine_around, scattered_spot,
+    scattered_step, step, through_slab,
 };
 use subsurface_lab::truth::{Patch, Place, SurfaceIntegral, Triangles, surface_integral};
 
@@ -40,37 +40,27 @@ impl Mesh {
 
     /// A square of this side around a point, turned.
     fn square(side_mm: f64, center: DVec3, turn: DMat3) -> Self {
-        Self::grid(1, 1, |u, v| {
-            center + turn * DVec3::new((u - 0.5) * side_mm, (v - 0.5) * side_mm, 0.0)
-        })
+        Self::grid(1, 1, |u, v| center + turn * DVec3::new((u - 0.5) * side_mm, (v - 0.5) * side_mm, 0.0))
     }
 
     /// The part of a sphere within `half` radians of an axis, both ways: at π/4 a sixth of it.
     fn cap(rho_mm: f64, axis: DVec3, half: f64, rows: u32) -> Self {
         let (right, up) = axis.any_orthonormal_pair();
         let at = |share: f64| ((2.0 * share - 1.0) * half).tan();
-        Self::grid(rows, rows, |u, v| {
-            rho_mm * (axis + at(u) * right + at(v) * up).normalize()
-        })
+        Self::grid(rows, rows, |u, v| rho_mm * (axis + at(u) * right + at(v) * up).normalize())
     }
 
     fn sphere(rho_mm: f64, rows: u32) -> Self {
         let axes = DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
-        axes.fold(Self::default(), |mesh, axis| {
-            mesh.and(Self::cap(rho_mm, axis, PI / 4.0, rows))
-        })
+        axes.fold(Self::default(), |mesh, axis| mesh.and(Self::cap(rho_mm, axis, PI / 4.0, rows)))
     }
 
     /// Drops the triangles whose middle is not wanted.
     fn keep(&mut self, wanted: impl Fn(Vec3) -> bool) {
-        let triangles = self.indices.chunks_exact(3).filter(|t| {
-            wanted(
-                t.iter()
-                    .map(|i| self.vertices_mm[*i as usize])
-                    .sum::<Vec3>()
-                    / 3.0,
-            )
-        });
+        let triangles = self
+            .indices
+            .chunks_exact(3)
+            .filter(|t| wanted(t.iter().map(|i| self.vertices_mm[*i as usize]).sum::<Vec3>() / 3.0));
         self.indices = triangles.flatten().copied().collect();
     }
 
@@ -91,29 +81,18 @@ impl Mesh {
         let corners = &self.indices[3 * place.triangle..][..3];
         let shares = place.barycentric.to_array();
         let terms = corners.iter().zip(shares);
-        terms
-            .map(|(&i, s)| (self.vertices_mm[i as usize] * s).as_dvec3())
-            .sum()
+        terms.map(|(&i, s)| (self.vertices_mm[i as usize] * s).as_dvec3()).sum()
     }
 
     /// The surface integral by the skin profile, of light that its points tell.
     fn integral(&self, asked: &[DVec3], light: impl Fn(DVec3) -> f64) -> SurfaceIntegral {
         let asked: Vec<Patch> = asked
             .iter()
-            .map(|p| Patch {
-                point_mm: p.as_vec3(),
-                area_mm2: 0.0,
-                irradiance: Vec3::ZERO,
-            })
+            .map(|p| Patch { point_mm: p.as_vec3(), area_mm2: 0.0, irradiance: Vec3::ZERO })
             .collect();
-        let mesh = Triangles {
-            vertices_mm: &self.vertices_mm,
-            indices: &self.indices,
-        };
+        let mesh = Triangles { vertices_mm: &self.vertices_mm, indices: &self.indices };
         let lit = |places: &[Place]| -> Result<_, ()> {
-            let e = places
-                .iter()
-                .map(|p| Vec3::splat(light(self.point(p)) as f32));
+            let e = places.iter().map(|p| Vec3::splat(light(self.point(p)) as f32));
             Ok(e.collect())
         };
         surface_integral(mesh, &asked, &Profile::SKIN, 1.0, lit, &|_| ()).unwrap()
@@ -125,12 +104,7 @@ fn assert_exact(what: &str, found: &[Vec3], expected: impl IntoIterator<Item = D
     assert_within(EXACT, what, found, expected);
 }
 
-fn assert_within(
-    tolerance: f64,
-    what: &str,
-    found: &[Vec3],
-    expected: impl IntoIterator<Item = DVec3>,
-) {
+fn assert_within(tolerance: f64, what: &str, found: &[Vec3], expected: impl IntoIterator<Item = DVec3>) {
     let pairs = found.iter().zip(expected);
     let worst = pairs.map(|(f, e)| (f.as_dvec3() - e).abs().max_element());
     let worst = worst.fold(0.0, f64::max);
@@ -155,10 +129,7 @@ fn disc(r: f64, radius: f64, v: f64) -> f64 {
     let ring = |s: f64| {
         let i0 = |x: f64| {
             let angle = |k: usize| PI * (k as f64 + 0.5) / 200.0;
-            (0..400)
-                .map(|k| (x * (angle(k).cos() - 1.0)).exp())
-                .sum::<f64>()
-                / 400.0
+            (0..400).map(|k| (x * (angle(k).cos() - 1.0)).exp()).sum::<f64>() / 400.0
         };
         s / v * (-(r - s).powi(2) / (2.0 * v)).exp() * i0(r * s / v)
     };
@@ -176,13 +147,7 @@ fn scattered_disc(r: f64, radius: f64, blur_mm2: f64) -> DVec3 {
 #[test]
 fn the_surface_integral_knows_edges_at_any_angle_and_tilt() {
     let xs = across_edge();
-    for (angle, tilt) in [
-        (0.0, 0.0),
-        (27.0, 0.0),
-        (45.0, 0.0),
-        (90.0, 0.0),
-        (20.0, 70.0),
-    ] {
+    for (angle, tilt) in [(0.0, 0.0), (27.0, 0.0), (45.0, 0.0), (90.0, 0.0), (20.0, 70.0)] {
         let turn = DMat3::from_rotation_x(f64::to_radians(tilt));
         let (sin, cos) = f64::to_radians(angle).sin_cos();
         let across = turn * DVec3::new(cos, sin, 0.0);
@@ -190,10 +155,7 @@ fn the_surface_integral_knows_edges_at_any_angle_and_tilt() {
         let asked: Vec<_> = xs.iter().map(|x| *x * across).collect();
         for blur_mm2 in [0.01, 0.04] {
             let found = mesh.integral(&asked, |p| step(p.dot(across), blur_mm2));
-            let expected = || {
-                xs.iter()
-                    .map(|x| scattered_step(*x, blur_mm2, &Profile::SKIN))
-            };
+            let expected = || xs.iter().map(|x| scattered_step(*x, blur_mm2, &Profile::SKIN));
             let what = format!("edge at {angle}°, tilted by {tilt}°, soft by {blur_mm2} mm²");
             assert_exact(&what, &found.printed, expected());
             assert_exact(&what, &found.normalised, expected());
@@ -207,9 +169,7 @@ fn the_surface_integral_knows_a_disc() {
     let (radius, blur) = (1.5, 0.04);
     let asked: Vec<_> = rs.iter().map(|r| DVec3::new(0.6, 0.8, 0.0) * *r).collect();
     // The blurred disc itself, from a table: a patch asks for it millions of times.
-    let table: Vec<f64> = (0..400)
-        .map(|i| disc(0.01 * f64::from(i), radius, blur))
-        .collect();
+    let table: Vec<f64> = (0..400).map(|i| disc(0.01 * f64::from(i), radius, blur)).collect();
     let light = |p: DVec3| {
         let at = (p.length() / 0.01).min(398.0);
         let i = at as usize;
@@ -226,26 +186,17 @@ fn the_surface_integral_knows_spheres_past_the_terminator() {
     let light = DVec3::new(0.6, 0.0, 0.8);
     // Around the terminator, where a patch of the large one will do.
     let pole = DVec3::new(0.8, 0.0, -0.6);
-    for (rho_mm, mesh, half) in [
-        (10.0, Mesh::sphere(10.0, 100), 1.5),
-        (100.0, Mesh::cap(100.0, pole, 0.35, 60), 0.2),
-    ] {
+    for (rho_mm, mesh, half) in
+        [(10.0, Mesh::sphere(10.0, 100), 1.5), (100.0, Mesh::cap(100.0, pole, 0.35, 60), 0.2)]
+    {
         let asked: Vec<_> = (-30..=30)
             .map(|i| DMat3::from_rotation_y(half * f64::from(i) / 30.0) * pole * rho_mm)
             .collect();
         let truth = scattered_cosine(rho_mm, &Profile::SKIN);
         let found = mesh.integral(&asked, |p| p.normalize().dot(light).max(0.0));
         let expected = || asked.iter().map(|p| truth(p.dot(light) / rho_mm));
-        assert_exact(
-            &format!("sphere of {rho_mm} mm"),
-            &found.printed,
-            expected(),
-        );
-        assert_exact(
-            &format!("sphere of {rho_mm} mm, normalised"),
-            &found.normalised,
-            expected(),
-        );
+        assert_exact(&format!("sphere of {rho_mm} mm"), &found.printed, expected());
+        assert_exact(&format!("sphere of {rho_mm} mm, normalised"), &found.normalised, expected());
     }
 }
 
@@ -270,25 +221,12 @@ fn the_surface_integral_knows_a_cylinder() {
                 mass += w;
             }
             let unit = TAU / STEPS as f64 * rho_mm / (TAU * v).sqrt();
-            DVec3::from(g.weight.map(f64::from))
-                * if normalised {
-                    light / mass
-                } else {
-                    light * unit
-                }
+            DVec3::from(g.weight.map(f64::from)) * if normalised { light / mass } else { light * unit }
         });
         terms.sum()
     };
-    assert_exact(
-        "cylinder",
-        &found.printed,
-        phis.iter().map(|p| scattered(*p, false)),
-    );
-    assert_exact(
-        "cylinder, normalised",
-        &found.normalised,
-        phis.iter().map(|p| scattered(*p, true)),
-    );
+    assert_exact("cylinder", &found.printed, phis.iter().map(|p| scattered(*p, false)));
+    assert_exact("cylinder, normalised", &found.normalised, phis.iter().map(|p| scattered(*p, true)));
     // The series against the sum over angles.
     let series = scattered_cosine_around(rho_mm, &Profile::SKIN);
     for phi in &phis {
@@ -315,11 +253,7 @@ fn the_surface_integral_knows_layers_and_a_slab_lit_from_behind() {
             terms.sum()
         };
         let what = format!("layers {gap_mm} mm apart");
-        assert_exact(
-            &what,
-            &found.printed,
-            xs.iter().map(|_| through_slab(gap_mm, &Profile::SKIN)),
-        );
+        assert_exact(&what, &found.printed, xs.iter().map(|_| through_slab(gap_mm, &Profile::SKIN)));
         let what = format!("{what}, normalised");
         assert_exact(&what, &found.normalised, xs.iter().map(|x| normalised(*x)));
     }
@@ -327,16 +261,9 @@ fn the_surface_integral_knows_layers_and_a_slab_lit_from_behind() {
 
 #[test]
 fn a_gaussian_of_no_width_keeps_the_irradiance() {
-    let asked = [Patch {
-        point_mm: Vec3::ZERO,
-        area_mm2: 0.0,
-        irradiance: Vec3::new(0.1, 0.2, 0.3),
-    }];
+    let asked = [Patch { point_mm: Vec3::ZERO, area_mm2: 0.0, irradiance: Vec3::new(0.1, 0.2, 0.3) }];
     let mesh = Mesh::square(9.0, DVec3::ZERO, DMat3::IDENTITY);
-    let mesh = Triangles {
-        vertices_mm: &mesh.vertices_mm,
-        indices: &mesh.indices,
-    };
+    let mesh = Triangles { vertices_mm: &mesh.vertices_mm, indices: &mesh.indices };
     let none = |_: &[Place]| -> Result<Vec<Vec3>, ()> { Err(()) };
     let profile = single_gaussian(0.0);
     let found = surface_integral(mesh, &asked, &profile, 1.0, none, &|_| ()).unwrap();
@@ -345,12 +272,7 @@ fn a_gaussian_of_no_width_keeps_the_irradiance() {
 }
 
 /// The visible integral at some pixels against what each should be.
-fn assert_visible(
-    what: &str,
-    g: &GBuffer,
-    pixels: &[(usize, Hit)],
-    expected: impl Fn(&Hit) -> DVec3,
-) {
+fn assert_visible(what: &str, g: &GBuffer, pixels: &[(usize, Hit)], expected: impl Fn(&Hit) -> DVec3) {
     let places: Vec<usize> = pixels.iter().map(|(i, _)| *i).collect();
     let found = g.visible_integral(&places, &Profile::SKIN);
     let found: Vec<_> = found.iter().map(|f| f.as_vec3()).collect();
@@ -366,10 +288,8 @@ fn the_visible_integral_knows_soft_edges() {
             let (sin, cos) = f64::to_radians(angle).sin_cos();
             let across = DVec3::new(cos, sin, 0.0);
             let side = (28.0 * px_per_mm) as u32 + 16;
-            let g =
-                View::orthographic([side, side], px_per_mm).shoot(plane(DVec3::Z, 300.0, |p| {
-                    DVec3::splat(step(p.dot(across), blur_mm2))
-                }));
+            let g = View::orthographic([side, side], px_per_mm)
+                .shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(step(p.dot(across), blur_mm2))));
             // Errors of narrow kernels are at the edge, within a few pixels.
             let near = |h: &Hit| h.point.truncate().abs().max_element() < 5.0 / px_per_mm;
             let what = format!("{px_per_mm} px/mm, edge at {angle}°");
@@ -386,25 +306,19 @@ fn the_visible_integral_knows_a_tilted_edge_and_a_disc() {
     let (px_per_mm, blur_mm2) = (16.0, 0.04);
     let turn = DMat3::from_rotation_x(f64::to_radians(60.0));
     let across = turn * DVec3::new(0.9, 0.436, 0.0).normalize();
-    let g = View::orthographic([448, 448], px_per_mm).shoot(plane(turn * DVec3::Z, 300.0, |p| {
-        DVec3::splat(step(p.dot(across), blur_mm2))
-    }));
+    let g = View::orthographic([448, 448], px_per_mm)
+        .shoot(plane(turn * DVec3::Z, 300.0, |p| DVec3::splat(step(p.dot(across), blur_mm2))));
     let x = |h: &Hit| (h.point - DVec3::new(0.0, 0.0, -300.0)).dot(across);
     let near = |h: &Hit| x(h).abs() < 3.0 && h.point.truncate().length() < 3.0;
     let pixels: Vec<_> = g.pixels(near).into_iter().step_by(61).collect();
-    assert_visible("tilted by 60°", &g, &pixels, |h| {
-        scattered_step(x(h), blur_mm2, &Profile::SKIN)
-    });
+    assert_visible("tilted by 60°", &g, &pixels, |h| scattered_step(x(h), blur_mm2, &Profile::SKIN));
 
     let (radius, blur_mm2) = (1.5, 0.0625);
-    let g = View::orthographic([112, 112], 4.0).shoot(plane(DVec3::Z, 300.0, |p| {
-        DVec3::splat(disc(p.length(), radius, blur_mm2))
-    }));
+    let g = View::orthographic([112, 112], 4.0)
+        .shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(disc(p.length(), radius, blur_mm2))));
     let r = |h: &Hit| h.point.truncate().length();
     let pixels: Vec<_> = g.pixels(|h| r(h) < 3.0).into_iter().step_by(11).collect();
-    assert_visible("disc", &g, &pixels, |h| {
-        scattered_disc(r(h), radius, blur_mm2)
-    });
+    assert_visible("disc", &g, &pixels, |h| scattered_disc(r(h), radius, blur_mm2));
 }
 
 /// The visible integral against the surface integral over the part of a mesh that is seen.
@@ -467,11 +381,7 @@ fn the_visible_integral_is_the_surface_integral_over_what_is_seen() {
         let view = View::orthographic([576, 480], 20.0);
         let g = view.shoot(|origin, _| {
             let near = origin.x < 0.0;
-            let [z, e] = if near {
-                [gap_mm - 20.0, 0.0]
-            } else {
-                [-20.0, 1.0]
-            };
+            let [z, e] = if near { [gap_mm - 20.0, 0.0] } else { [-20.0, 1.0] };
             Some(Hit {
                 point: origin.truncate().extend(z),
                 normal: DVec3::Z,
@@ -479,20 +389,12 @@ fn the_visible_integral_is_the_surface_integral_over_what_is_seen() {
                 id: 1,
             })
         });
-        let half =
-            |x: f64, z: f64| Mesh::grid(1, 1, |u, v| DVec3::new(x + 14.4 * u, 24.0 * (v - 0.5), z));
+        let half = |x: f64, z: f64| Mesh::grid(1, 1, |u, v| DVec3::new(x + 14.4 * u, 24.0 * (v - 0.5), z));
         let seen = half(-14.4, gap_mm - 20.0).and(half(0.0, -20.0));
         let near = |h: &Hit| h.point.truncate().length() < 6.0;
         let pixels: Vec<_> = g.pixels(near).into_iter().step_by(83).collect();
         let lit = |p: DVec3| if p.z < 0.5 * gap_mm - 20.0 { 1.0 } else { 0.0 };
-        assert_same_as_surface(
-            &format!("layers {gap_mm} mm apart"),
-            EXACT,
-            &g,
-            &seen,
-            &pixels,
-            lit,
-        );
+        assert_same_as_surface(&format!("layers {gap_mm} mm apart"), EXACT, &g, &seen, &pixels, lit);
     }
 }
 
@@ -513,18 +415,13 @@ fn waves_and_spots_are_what_a_sum_over_the_plane_makes_of_them() {
     let profile = Profile::SKIN;
     let scattered = |light: &dyn Fn(f64, f64) -> f64| -> DVec3 {
         let gaussians = profile.gaussians().iter();
-        gaussians
-            .map(|g| DVec3::from(g.weight.map(f64::from)) * sum(light, g.variance_mm2.into()))
-            .sum()
+        gaussians.map(|g| DVec3::from(g.weight.map(f64::from)) * sum(light, g.variance_mm2.into())).sum()
     };
     let wave = scattered(&|x, _| (0.9 * x).cos());
     assert!((wave - passed_wave(0.9, &profile)).abs().max_element() < 1e-6);
     let spot = scattered(&|x, y| (-((x + 1.5).powi(2) + y * y) / 2.0).exp());
     let closed = scattered_spot(1.5, 1.0, &profile);
-    assert!(
-        (spot - closed).abs().max_element() < 1e-6,
-        "{spot} {closed}"
-    );
+    assert!((spot - closed).abs().max_element() < 1e-6, "{spot} {closed}");
 }
 
 #[test]
@@ -545,12 +442,8 @@ fn harmonics_are_what_a_sum_over_the_sphere_makes_of_them() {
         sum / mass
     };
     let gaussians = profile.gaussians().iter();
-    let summed: DVec3 = gaussians
-        .map(|g| DVec3::from(g.weight.map(f64::from)) * mean(g.variance_mm2.into()))
-        .sum();
+    let summed: DVec3 =
+        gaussians.map(|g| DVec3::from(g.weight.map(f64::from)) * mean(g.variance_mm2.into())).sum();
     let closed = passed_harmonics(rho_mm, degree + 1, &profile)[degree];
-    assert!(
-        (summed - closed).abs().max_element() < 1e-5,
-        "{summed} {closed}"
-    );
+    assert!((summed - closed).abs().max_element() < 1e-5, "{summed} {closed}");
 }

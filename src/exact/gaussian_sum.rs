@@ -48,11 +48,7 @@ pub(crate) struct Settings {
 
 impl Settings {
     pub(crate) fn new(profiles: &[Profile], mm_per_unit: f32) -> Self {
-        let mut settings = Self {
-            mm_per_unit,
-            profiles: profiles.len() as u32,
-            ..Self::zeroed()
-        };
+        let mut settings = Self { mm_per_unit, profiles: profiles.len() as u32, ..Self::zeroed() };
         let slots = settings.gaussians.chunks_exact_mut(Profile::MAX_GAUSSIANS);
         for (slots, profile) in slots.zip(profiles) {
             for (slot, g) in slots.iter_mut().zip(profile.gaussians()) {
@@ -124,12 +120,7 @@ impl Inputs {
         viewport: Option<Viewport>,
     ) -> Self {
         let counts = profiles.iter().map(|p| p.gaussians().len() as u32);
-        Self {
-            textures,
-            settings,
-            gaussians: counts.max().unwrap_or(0),
-            viewport,
-        }
+        Self { textures, settings, gaussians: counts.max().unwrap_or(0), viewport }
     }
 }
 
@@ -162,11 +153,7 @@ impl GaussianSum {
                 constants: &[],
             }
             .pipeline(device);
-            Pass {
-                textures: textures.to_vec(),
-                layout,
-                pipeline,
-            }
+            Pass { textures: textures.to_vec(), layout, pipeline }
         };
         let resolve = match output {
             Output::Scattered(_) => "fs_resolve",
@@ -191,8 +178,7 @@ impl GaussianSum {
     /// Scratch for a surface of this size.
     pub(crate) fn sums(&self, device: &Device, size: [u32; 2]) -> Sums {
         let label = self.label;
-        let view =
-            |name: &str| gpu::scratch_texture(device, &format!("{label} {name}"), size, SCRATCH);
+        let view = |name: &str| gpu::scratch_texture(device, &format!("{label} {name}"), size, SCRATCH);
         Sums {
             size,
             settings: gpu::uniform_buffer::<Settings>(device, &format!("{label} settings")),

@@ -6,8 +6,8 @@ pub(crate) mod gaussian_sum;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, UVec2, Vec2};
 use wgpu::{
-    BindGroup, BindGroupLayout, BindingResource, Buffer, Device, Queue, RenderPipeline,
-    ShaderStages, TextureFormat, TextureView,
+    BindGroup, BindGroupLayout, BindingResource, Buffer, Device, Queue, RenderPipeline, ShaderStages,
+    TextureFormat, TextureView,
 };
 
 use crate::gpu::{self, Recorder};
@@ -113,10 +113,8 @@ impl Exact {
         };
         queue.write_buffer(&view.settings, 0, bytemuck::bytes_of(&settings));
         let profile_id = frame.profile_id.unwrap_or(&self.no_id);
-        let is_bound = view
-            .bound
-            .as_ref()
-            .is_some_and(|b| b.depth == *frame.depth && b.profile_id == *profile_id);
+        let is_bound =
+            view.bound.as_ref().is_some_and(|b| b.depth == *frame.depth && b.profile_id == *profile_id);
         if !is_bound {
             let resources = [
                 (0, view.settings.as_entire_binding()),
@@ -166,16 +164,6 @@ mod tests {
 
     #[test]
     fn settings_lie_as_the_shader_has_them() {
-        assert_layout!(
-            SHADER,
-            "Settings",
-            Settings {
-                inverse_projection,
-                first_pixel,
-                size,
-                far,
-                has_id
-            }
-        );
+        assert_layout!(SHADER, "Settings", Settings { inverse_projection, first_pixel, size, far, has_id });
     }
 }

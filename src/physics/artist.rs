@@ -32,18 +32,11 @@ impl Burley {
         check_length("distance_mm", distance_mm)?;
         let d = distance_mm / self.scale(albedo);
         // What leaves within r.
-        let within =
-            |r: f64| albedo * (1.0 - 0.25 * (-r / d).exp() - 0.75 * (-r / (3.0 * d)).exp());
+        let within = |r: f64| albedo * (1.0 - 0.25 * (-r / d).exp() - 0.75 * (-r / (3.0 * d)).exp());
         let (least, rings) = (1e-4 * d, 400);
         let ratio = (100.0 * d / least).powf(1.0 / f64::from(rings));
         let radius = |i: i32| if i == 0 { 0.0 } else { least * ratio.powi(i) };
-        let ring = |i: i32| {
-            (
-                radius(i),
-                radius(i + 1),
-                within(radius(i + 1)) - within(radius(i)),
-            )
-        };
+        let ring = |i: i32| (radius(i), radius(i + 1), within(radius(i + 1)) - within(radius(i)));
         Ok(Response::rings((0..rings).map(ring)))
     }
 
@@ -59,22 +52,14 @@ impl Burley {
 
 fn check_albedo(name: &str, albedo: f64) -> Result<(), Error> {
     if !(albedo > 0.0 && albedo <= 0.999) {
-        return Err(number(
-            format!("artist: {name}"),
-            albedo,
-            "above 0, at most 0.999",
-        ));
+        return Err(number(format!("artist: {name}"), albedo, "above 0, at most 0.999"));
     }
     Ok(())
 }
 
 fn check_length(name: &str, mm: f64) -> Result<(), Error> {
     if !(mm > 0.0 && mm <= 1e12) {
-        return Err(number(
-            format!("artist: {name}"),
-            mm,
-            "above 0, at most 1e12 mm",
-        ));
+        return Err(number(format!("artist: {name}"), mm, "above 0, at most 1e12 mm"));
     }
     Ok(())
 }
@@ -134,10 +119,7 @@ pub fn blender_skin(albedo: f64, radius_mm: f64, eta: f64, g: f64) -> Result<Med
     }
     let alpha = 0.5 * (least + most);
     let free = radius_mm * (3.0 * (1.0 - alpha)).sqrt();
-    Medium::homogeneous(
-        Layer::isotropic((1.0 - alpha) / free, alpha / free).with_g(g),
-        eta,
-    )
+    Medium::homogeneous(Layer::isotropic((1.0 - alpha) / free, alpha / free).with_g(g), eta)
 }
 
 /// A glTF material of KHR_materials_volume and KHR_materials_volume_scatter, in one colour. Its text lets a

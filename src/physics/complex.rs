@@ -59,10 +59,7 @@ impl Sub for Complex {
 impl Mul for Complex {
     type Output = Self;
     fn mul(self, b: Self) -> Self {
-        Self::new(
-            self.re * b.re - self.im * b.im,
-            self.re * b.im + self.im * b.re,
-        )
+        Self::new(self.re * b.re - self.im * b.im, self.re * b.im + self.im * b.re)
     }
 }
 

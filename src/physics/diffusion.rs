@@ -43,11 +43,7 @@ impl Diffusion {
         let once = Once::new(layer, medium.eta());
         let ms = |r: f64| self.multiple(layer, &boundary, r);
         let ss = |r: f64| {
-            if self == Self::Dipole {
-                0.0
-            } else {
-                once.radial(r)
-            }
+            if self == Self::Dipole { 0.0 } else { once.radial(r) }
         };
         let reach = (20.0 * free).max(40.0 / layer.sigma_tr()).min(1e5 * free);
         Ok(Response::sample(1e-4 * free, reach, |r| ms(r) + ss(r)))
@@ -122,16 +118,10 @@ impl Boundary {
     fn new(eta: f64) -> Self {
         let moment = |power: i32| {
             let nodes = directions(16, eta).into_iter();
-            nodes
-                .map(|d| d.weight * d.fresnel * d.mu.powi(power))
-                .sum::<f64>()
+            nodes.map(|d| d.weight * d.fresnel * d.mu.powi(power)).sum::<f64>()
         };
         let [c1, c2] = [moment(1), moment(2)];
-        let f_dr = if eta == 1.0 {
-            0.0
-        } else {
-            -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta
-        };
+        let f_dr = if eta == 1.0 { 0.0 } else { -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta };
         Self {
             a_classical: (1.0 + f_dr) / (1.0 - f_dr),
             a: (1.0 + 3.0 * c2) / (1.0 - 2.0 * c1),
@@ -161,19 +151,12 @@ impl Once {
             let (mu, cos) = psi.sin_cos();
             let leaves = henyey_greenstein(layer.g, -mu) * (1.0 - fresnel_inside(mu, eta)) * mu;
             let share = range * 6.0 * t * (1.0 - t) * weight;
-            (
-                share * layer.sigma_s_per_mm * leaves,
-                sigma_t * (mu + 1.0) / cos,
-            )
+            (share * layer.sigma_s_per_mm * leaves, sigma_t * (mu + 1.0) / cos)
         };
         Self(gauss(64).into_iter().map(at).collect())
     }
 
     fn radial(&self, r_mm: f64) -> f64 {
-        self.0
-            .iter()
-            .map(|(light, fade)| light * (-fade * r_mm).exp())
-            .sum::<f64>()
-            / r_mm
+        self.0.iter().map(|(light, fade)| light * (-fade * r_mm).exp()).sum::<f64>() / r_mm
     }
 }

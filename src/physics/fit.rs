@@ -87,11 +87,7 @@ impl Fit {
 
     /// What the worst colour is off by beyond its floor, as if the two were independent.
     fn excess(&self) -> f64 {
-        let above = self
-            .edge_error
-            .iter()
-            .zip(&self.floor)
-            .map(|(e, floor)| e * e - floor * floor);
+        let above = self.edge_error.iter().zip(&self.floor).map(|(e, floor)| e * e - floor * floor);
         above.fold(0.0, f64::max).sqrt()
     }
 
@@ -121,18 +117,8 @@ impl Target {
                 return Err(number(input, albedo, "a number above 0"));
             }
         }
-        let lacks = |x: f64| {
-            responses
-                .iter()
-                .map(|r| (1.0 - r.edge(x)).abs())
-                .fold(0.0, f64::max)
-        };
-        let has = |x: f64| {
-            responses
-                .iter()
-                .map(|r| r.edge(x) - 0.5)
-                .fold(0.0, f64::max)
-        };
+        let lacks = |x: f64| responses.iter().map(|r| (1.0 - r.edge(x)).abs()).fold(0.0, f64::max);
+        let has = |x: f64| responses.iter().map(|r| r.edge(x) - 0.5).fold(0.0, f64::max);
         // Media that are as wide as a house start further out.
         let mut first = NEAREST_MM;
         while has(2.0 * first) < 1e-4 && first < 1e15 {
@@ -148,14 +134,8 @@ impl Target {
         let n = POINTS * DENSER;
         let ratio = (2.0 * last / first).powf(1.0 / (n - 1) as f64);
         let x_mm: Vec<f64> = (0..n).map(|i| first * ratio.powi(i as i32)).collect();
-        let edges = responses
-            .each_ref()
-            .map(|r| x_mm.iter().map(|x| r.edge(*x)).collect());
-        Ok(Self {
-            x_mm,
-            edges,
-            albedo,
-        })
+        let edges = responses.each_ref().map(|r| x_mm.iter().map(|x| r.edge(*x)).collect());
+        Ok(Self { x_mm, edges, albedo })
     }
 
     /// Worst errors of many Gaussians, none of them negative.
@@ -165,9 +145,7 @@ impl Target {
         let n = ((4.0 * last / first).ln() / RATIO.ln()).ceil().min(40.0) as i32;
         let sigma = |i: i32| 0.25 * first * RATIO.powi(i);
         let search = Search::new(self);
-        let columns: Vec<_> = (0..=n)
-            .map(|i| search.column(sigma(i) * sigma(i)))
-            .collect();
+        let columns: Vec<_> = (0..=n).map(|i| search.column(sigma(i) * sigma(i))).collect();
         search.edges.each_ref().map(|edge| {
             let mixed = minimax::mix(&columns, &nearest(&columns, edge));
             let off = mixed.iter().zip(edge).map(|(m, e)| (m - e).abs());
@@ -199,12 +177,7 @@ impl Target {
         let search = Search::new(self);
         let see = |point: &Point| {
             let profile = search.profile(point)?;
-            Ok::<_, Error>(Fit {
-                profile,
-                edge_error: self.errors(&profile),
-                floor,
-                albedo: self.albedo,
-            })
+            Ok::<_, Error>(Fit { profile, edge_error: self.errors(&profile), floor, albedo: self.albedo })
         };
         let fit = |narrowest: f64| {
             let (low, high) = (narrowest * self.x_mm[0], last / 5.0);
@@ -242,11 +215,7 @@ struct Point {
 /// The weights of columns, none negative and 1 in all, whose sum is nearest to these values at the worst.
 fn nearest(columns: &[Vec<f64>], values: &[f64]) -> Vec<f64> {
     let mut weights = Minimax::new(columns.len(), |_| true);
-    weights.solve(
-        columns,
-        &[minimax::Target::new(values.to_vec())],
-        f64::INFINITY,
-    );
+    weights.solve(columns, &[minimax::Target::new(values.to_vec())], f64::INFINITY);
     weights.weights()
 }
 
@@ -268,10 +237,7 @@ fn update(inverse: &mut Option<Vec<Vec<f64>>>, s: &[f64], y: &[f64], sy: f64, yy
         (0..k).for_each(|i| h[i][i] = sy / yy);
         h
     });
-    let hy: Vec<f64> = h
-        .iter()
-        .map(|row| row.iter().zip(y).map(|(h, y)| h * y).sum())
-        .collect();
+    let hy: Vec<f64> = h.iter().map(|row| row.iter().zip(y).map(|(h, y)| h * y).sum()).collect();
     let yhy: f64 = hy.iter().zip(y).map(|(a, b)| a * b).sum();
     for i in 0..k {
         for j in 0..k {
@@ -289,10 +255,7 @@ struct Search {
 impl Search {
     fn new(target: &Target) -> Self {
         let at = |v: &[f64]| v.iter().copied().step_by(DENSER).collect::<Vec<_>>();
-        Self {
-            x_mm: at(&target.x_mm),
-            edges: target.edges.each_ref().map(|e| at(e)),
-        }
+        Self { x_mm: at(&target.x_mm), edges: target.edges.each_ref().map(|e| at(e)) }
     }
 
     /// What a Gaussian makes of a step edge.
@@ -309,22 +272,13 @@ impl Search {
             variance_mm2: v.min(f64::from(f32::MAX)) as f32,
             weight: [0, 1, 2].map(|c| weights[c][j] as f32),
         };
-        Profile::new(
-            &variances
-                .iter()
-                .enumerate()
-                .map(gaussian)
-                .collect::<Vec<_>>(),
-        )
+        Profile::new(&variances.iter().enumerate().map(gaussian).collect::<Vec<_>>())
     }
 
     /// Variances of least squares.
     fn start(&self, log_variances: Vec<f64>) -> State {
         let u = [(); 3].map(|()| vec![1.0 / POINTS as f64; POINTS]);
-        let mut state = State {
-            point: self.at(log_variances, &u),
-            u,
-        };
+        let mut state = State { point: self.at(log_variances, &u), u };
         self.descend(&mut state, 60);
         state
     }
@@ -371,14 +325,10 @@ impl Search {
             let falls = dot(&way, &point.slope);
             let moved = |share: f64| {
                 let logs = point.log_variances.iter().zip(&way);
-                (
-                    share,
-                    self.at(logs.map(|(v, w)| v + share * w).collect(), u),
-                )
+                (share, self.at(logs.map(|(v, w)| v + share * w).collect(), u))
             };
             let shares = [1.0, 0.3, 0.09, 0.027, 0.008].into_iter();
-            let enough =
-                |(share, next): &(f64, Point)| next.value <= point.value + 1e-4 * share * falls;
+            let enough = |(share, next): &(f64, Point)| next.value <= point.value + 1e-4 * share * falls;
             let Some((share, next)) = shares.map(moved).find(enough) else {
                 if inverse.take().is_none() {
                     return;
@@ -413,12 +363,8 @@ impl Search {
                 slopes.push(-0.5 * t * (-0.5 * t * t).exp() / (2.0 * std::f64::consts::PI).sqrt());
             }
         }
-        let mut point = Point {
-            log_variances,
-            value: 0.0,
-            slope: vec![0.0; k],
-            residuals: Default::default(),
-        };
+        let mut point =
+            Point { log_variances, value: 0.0, slope: vec![0.0; k], residuals: Default::default() };
         for c in 0..3 {
             let mut gram = vec![vec![SUM; k]; k];
             let mut rhs = vec![SUM; k];

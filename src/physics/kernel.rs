@@ -190,8 +190,7 @@ impl<const B: usize, const P: usize> Kernel<B, P> {
                     k[index(i, p, b) * size + index(c, q, b2)] += down * scatters(c, l2);
                     if c < i {
                         // From i to c: straight up, or mirrored.
-                        let up =
-                            receives[q] * (sign(q + l + l2) * direct + sign(l + m2) * mirrored);
+                        let up = receives[q] * (sign(q + l + l2) * direct + sign(l + m2) * mirrored);
                         k[index(c, q, b2) * size + index(i, p, b)] += up * scatters(i, l);
                     }
                 }

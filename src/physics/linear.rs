@@ -52,19 +52,13 @@ pub(super) fn nnls(gram: &[Vec<f64>], rhs: &[f64]) -> Vec<f64> {
         }
         free.push(next);
         loop {
-            let mut system: Vec<f64> = free
-                .iter()
-                .flat_map(|i| free.iter().map(|j| gram[*i][*j]))
-                .collect();
+            let mut system: Vec<f64> =
+                free.iter().flat_map(|i| free.iter().map(|j| gram[*i][*j])).collect();
             let mut wanted: Vec<f64> = free.iter().map(|j| rhs[*j]).collect();
             solve(&mut system, &mut wanted);
             // As far towards the solution as none of the free ones gets below 0.
             let mut step = 1.0;
-            for (&j, &wanted) in free
-                .iter()
-                .zip(&wanted)
-                .filter(|(_, wanted)| **wanted <= 0.0)
-            {
+            for (&j, &wanted) in free.iter().zip(&wanted).filter(|(_, wanted)| **wanted <= 0.0) {
                 step = f64::min(step, x[j] / (x[j] - wanted).max(f64::MIN_POSITIVE));
             }
             for (&j, &wanted) in free.iter().zip(&wanted) {

@@ -25,30 +25,18 @@ pub struct Layer {
 impl Layer {
     /// A layer without end that scatters all ways alike by σs′, as tables of reduced coefficients want it.
     pub const fn isotropic(sigma_a_per_mm: f64, sigma_s_per_mm: f64) -> Self {
-        Self {
-            thickness_mm: f64::INFINITY,
-            sigma_a_per_mm,
-            sigma_s_per_mm,
-            g: 0.0,
-        }
+        Self { thickness_mm: f64::INFINITY, sigma_a_per_mm, sigma_s_per_mm, g: 0.0 }
     }
 
     /// The same layer, this thick.
     pub const fn thick(self, thickness_mm: f64) -> Self {
-        Self {
-            thickness_mm,
-            ..self
-        }
+        Self { thickness_mm, ..self }
     }
 
     /// The same absorption and σs′ by scattering of this mean cosine.
     pub fn with_g(self, g: f64) -> Self {
         let sigma_s_per_mm = self.sigma_s_reduced() / (1.0 - g);
-        Self {
-            sigma_s_per_mm,
-            g,
-            ..self
-        }
+        Self { sigma_s_per_mm, g, ..self }
     }
 
     /// σs′ = σs(1 − g).
@@ -110,29 +98,17 @@ impl Medium {
             };
             // What sums and squares of these stay far within a float.
             const RANGE: RangeInclusive<f64> = 0.0..=1e12;
-            let Layer {
-                thickness_mm,
-                sigma_a_per_mm,
-                sigma_s_per_mm,
-                g,
-            } = *layer;
+            let Layer { thickness_mm, sigma_a_per_mm, sigma_s_per_mm, g } = *layer;
             if !G_RANGE.contains(&g) {
                 return refuse("g", g, "-0.5 to 0.99");
             }
             if i == last && thickness_mm != f64::INFINITY {
-                return refuse(
-                    "thickness_mm",
-                    thickness_mm,
-                    "infinity, since it is the last",
-                );
+                return refuse("thickness_mm", thickness_mm, "infinity, since it is the last");
             }
             if i != last && !RANGE.contains(&thickness_mm) {
                 return refuse("thickness_mm", thickness_mm, "a number of mm, 0 to 1e12");
             }
-            for (field, sigma) in [
-                ("sigma_a_per_mm", sigma_a_per_mm),
-                ("sigma_s_per_mm", sigma_s_per_mm),
-            ] {
+            for (field, sigma) in [("sigma_a_per_mm", sigma_a_per_mm), ("sigma_s_per_mm", sigma_s_per_mm)] {
                 if !RANGE.contains(&sigma) {
                     return refuse(field, sigma, "a number, 0 to 1e12");
                 }
@@ -145,11 +121,7 @@ impl Medium {
                 );
             }
         }
-        let layers: Vec<_> = layers
-            .iter()
-            .copied()
-            .filter(|l| l.thickness_mm > 0.0)
-            .collect();
+        let layers: Vec<_> = layers.iter().copied().filter(|l| l.thickness_mm > 0.0).collect();
         if layers.iter().all(|l| l.sigma_s_per_mm == 0.0) {
             let needs = "a number above 0 in one of them";
             return Err(number("medium: sigma_s_per_mm of all layers", 0.0, needs));

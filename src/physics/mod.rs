@@ -25,9 +25,5 @@ pub use transport::{Incidence, Transport};
 
 /// The error of a number out of its range.
 fn number(input: impl Into<String>, got: f64, needs: &'static str) -> Error {
-    Error::Number {
-        input: input.into(),
-        got,
-        needs,
-    }
+    Error::Number { input: input.into(), got, needs }
 }

@@ -67,17 +67,10 @@ impl Skin {
     };
 
     /// Medium skin.
-    pub const MEDIUM: Self = Self {
-        melanin: 0.12,
-        haemoglobin: 0.02,
-        ..Self::LIGHT
-    };
+    pub const MEDIUM: Self = Self { melanin: 0.12, haemoglobin: 0.02, ..Self::LIGHT };
 
     /// Dark skin.
-    pub const DARK: Self = Self {
-        melanin: 0.35,
-        ..Self::MEDIUM
-    };
+    pub const DARK: Self = Self { melanin: 0.35, ..Self::MEDIUM };
 
     /// The skin at 400 to 700 nm, every 20: (nm, medium). Donner & Jensen 2006, in 1/mm.
     ///
@@ -98,26 +91,15 @@ impl Skin {
         if !G_RANGE.contains(&self.g) {
             return Err(number("skin: g", self.g, "-0.5 to 0.99"));
         }
-        SPECTRUM
-            .iter()
-            .map(|w| Ok((w.0, self.medium(w)?)))
-            .collect()
+        SPECTRUM.iter().map(|w| Ok((w.0, self.medium(w)?))).collect()
     }
 
-    fn medium(
-        &self,
-        &Wavelength(nm, oxygenated, deoxygenated, _): &Wavelength,
-    ) -> Result<Medium, Error> {
+    fn medium(&self, &Wavelength(nm, oxygenated, deoxygenated, _): &Wavelength) -> Result<Medium, Error> {
         let mix = |share: f64, a: f64, b: f64| share * a + (1.0 - share) * b;
         let bare = 0.0244 + 8.53 * (-(nm - 154.0) / 66.2).exp();
-        let melanin = mix(
-            self.eumelanin,
-            6.6e10 * nm.powf(-3.33),
-            2.9e14 * nm.powf(-4.75),
-        );
+        let melanin = mix(self.eumelanin, 6.6e10 * nm.powf(-3.33), 2.9e14 * nm.powf(-4.75));
         // 150 g of haemoglobin, of 64 500 g a mole, to a litre; per mm, and e instead of ten.
-        let blood =
-            mix(self.oxygenation, oxygenated, deoxygenated) * 2.303 * 150.0 / 64500.0 / 10.0;
+        let blood = mix(self.oxygenation, oxygenated, deoxygenated) * 2.303 * 150.0 / 64500.0 / 10.0;
         let scattering = 14.74 * nm.powf(-0.22) + 2.2e11 * nm.powi(-4);
         let epidermis = Layer::isotropic(mix(self.melanin, melanin, bare), scattering);
         let dermis = Layer::isotropic(mix(self.haemoglobin, blood, bare), 0.5 * scattering);

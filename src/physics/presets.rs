@@ -72,9 +72,8 @@ pub fn donner_jensen_2005(g: f64) -> Result<[Medium; 3], Error> {
         ([0.0085, 0.1, 2.5], [0.45, 0.47, 0.48], f64::INFINITY),
     ];
     let medium = |c: usize| {
-        let layer = |(a, s, mm): ([f64; 3], [f64; 3], f64)| {
-            Layer::isotropic(a[c], s[c]).thick(mm).with_g(g)
-        };
+        let layer =
+            |(a, s, mm): ([f64; 3], [f64; 3], f64)| Layer::isotropic(a[c], s[c]).thick(mm).with_g(g);
         Medium::new(&LAYERS.map(layer), 1.4)
     };
     Ok([medium(0)?, medium(1)?, medium(2)?])

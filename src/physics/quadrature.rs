@@ -57,29 +57,19 @@ pub(super) struct Direction {
 /// Directions over the hemisphere, `n` to either side of the critical angle. They cluster at its ends, where
 /// Fresnel bends, and at μ = 0 and 1, where rays are long and waves stand still.
 pub(super) fn directions(n: usize, eta: f64) -> Vec<Direction> {
-    let (ends, slope) = (
-        |t: f64| t * t * (3.0 - 2.0 * t),
-        |t: f64| 6.0 * t * (1.0 - t),
-    );
+    let (ends, slope) = (|t: f64| t * t * (3.0 - 2.0 * t), |t: f64| 6.0 * t * (1.0 - t));
     let critical = (1.0 - 1.0 / (eta * eta)).sqrt();
-    let at = |mu: f64, weight: f64| Direction {
-        mu,
-        weight,
-        fresnel: fresnel_inside(mu, eta),
-    };
+    let at = |mu: f64, weight: f64| Direction { mu, weight, fresnel: fresnel_inside(mu, eta) };
     if eta == 1.0 {
         let nodes = gauss(2 * n).into_iter();
         return nodes.map(|(t, w)| at(ends(t), slope(t) * w)).collect();
     }
     let nodes = gauss(n);
-    let beyond = nodes.iter().map(|(t, w)| Direction {
-        fresnel: 1.0,
-        ..at(critical * t * t, critical * 2.0 * t * w)
-    });
-    let leaves = 1.0 - critical;
-    let within = nodes
+    let beyond = nodes
         .iter()
-        .map(|(t, w)| at(critical + leaves * ends(*t), leaves * slope(*t) * w));
+        .map(|(t, w)| Direction { fresnel: 1.0, ..at(critical * t * t, critical * 2.0 * t * w) });
+    let leaves = 1.0 - critical;
+    let within = nodes.iter().map(|(t, w)| at(critical + leaves * ends(*t), leaves * slope(*t) * w));
     beyond.chain(within).collect()
 }
 

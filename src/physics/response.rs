@@ -28,18 +28,14 @@ impl Response {
     pub fn gaussians(terms: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let terms = terms.into_iter();
         let term = |(variance_mm2, energy)| (energy, Term::Gaussian { variance_mm2 });
-        Self {
-            terms: terms.map(term).collect(),
-        }
+        Self { terms: terms.map(term).collect() }
     }
 
     /// Rings of (inner radius, outer radius, energy), in mm.
     pub fn rings(rings: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
         let rings = rings.into_iter();
         let term = |(inner_mm, outer_mm, energy)| (energy, Term::Ring { inner_mm, outer_mm });
-        Self {
-            terms: rings.map(term).collect(),
-        }
+        Self { terms: rings.map(term).collect() }
     }
 
     /// The radial profile `r`, given per mm² and sampled in rings of equal ratio from `from_mm` to `to_mm`.
@@ -60,13 +56,9 @@ impl Response {
     /// The sum of responses, each times its weight, which may be negative: colours from a spectrum.
     pub fn sum<'a>(parts: impl IntoIterator<Item = (f64, &'a Self)>) -> Self {
         let scaled = |(weight, part): (f64, &'a Self)| {
-            part.terms
-                .iter()
-                .map(move |&(energy, term)| (weight * energy, term))
+            part.terms.iter().map(move |&(energy, term)| (weight * energy, term))
         };
-        Self {
-            terms: parts.into_iter().flat_map(scaled).collect(),
-        }
+        Self { terms: parts.into_iter().flat_map(scaled).collect() }
     }
 
     /// The albedo R = ∫R(r)·2πr dr: what leaves of the light that entered.
@@ -77,9 +69,7 @@ impl Response {
     /// R(r) in 1/mm².
     pub fn radial(&self, r_mm: f64) -> f64 {
         let at = |(energy, term): &(f64, Term)| match *term {
-            Term::Gaussian { variance_mm2: v } => {
-                energy * (-0.5 * r_mm * r_mm / v).exp() / (2.0 * PI * v)
-            }
+            Term::Gaussian { variance_mm2: v } => energy * (-0.5 * r_mm * r_mm / v).exp() / (2.0 * PI * v),
             Term::Ring { inner_mm, outer_mm } if inner_mm <= r_mm && r_mm < outer_mm => {
                 energy / (PI * (outer_mm * outer_mm - inner_mm * inner_mm))
             }
@@ -93,9 +83,7 @@ impl Response {
     pub fn edge(&self, x_mm: f64) -> f64 {
         let at = |(energy, term): &(f64, Term)| match *term {
             Term::Gaussian { variance_mm2 } => energy * step(x_mm, variance_mm2),
-            Term::Ring { inner_mm, outer_mm } => {
-                energy * (0.5 + 0.5 * ring_edge(x_mm, inner_mm, outer_mm))
-            }
+            Term::Ring { inner_mm, outer_mm } => energy * (0.5 + 0.5 * ring_edge(x_mm, inner_mm, outer_mm)),
         };
         self.terms.iter().map(at).sum::<f64>() / self.albedo()
     }
@@ -133,11 +121,7 @@ fn ring_edge(x: f64, inner: f64, outer: f64) -> f64 {
     }
     // ∫ asin(min(1, x/r))·r dr, twice.
     let whole = |r: f64| {
-        if r <= x {
-            FRAC_PI_2 * r * r
-        } else {
-            r * r * (x / r).asin() + x * (r * r - x * x).sqrt()
-        }
+        if r <= x { FRAC_PI_2 * r * r } else { r * r * (x / r).asin() + x * (r * r - x * x).sqrt() }
     };
     (whole(outer) - whole(inner)) / (FRAC_PI_2 * (outer * outer - inner * inner))
 }

@@ -43,10 +43,7 @@ pub struct Transport {
 
 impl Default for Transport {
     fn default() -> Self {
-        Self {
-            incidence: Incidence::Normal,
-            order: 2,
-        }
+        Self { incidence: Incidence::Normal, order: 2 }
     }
 }
 
@@ -81,10 +78,8 @@ impl Transport {
         let (low, high) = solver.frequencies();
         let steps = ((high / low).log10() * FREQUENCIES).ceil() as usize;
         let ratio = (high / low).powf(1.0 / steps as f64);
-        let mut samples: Vec<(f64, Split)> = (0..=steps)
-            .map(|i| low * ratio.powi(i as i32))
-            .map(|s| (s, solver.solve(s)))
-            .collect();
+        let mut samples: Vec<(f64, Split)> =
+            (0..=steps).map(|i| low * ratio.powi(i as i32)).map(|s| (s, solver.solve(s))).collect();
         extend(&mut samples);
         let samples: Vec<_> = [(0.0, zero)].into_iter().chain(samples).collect();
         Ok(gaussians(&samples, albedo))
@@ -148,13 +143,9 @@ fn gaussians(samples: &[(f64, Split)], albedo: f64) -> Response {
     let (low, high) = (samples[1].0, samples[samples.len() - 1].0);
     let (least, most) = (0.5 / high, 4.0 / low);
     let terms = ((most / least).ln() / RATIO.ln()).ceil() as i32;
-    let variances: Vec<f64> = (0..=terms)
-        .map(|i| (least * RATIO.powi(i)).powi(2))
-        .collect();
-    let rows: Vec<Vec<f64>> = samples
-        .iter()
-        .map(|(s, _)| variances.iter().map(|v| (-0.5 * v * s * s).exp()).collect())
-        .collect();
+    let variances: Vec<f64> = (0..=terms).map(|i| (least * RATIO.powi(i)).powi(2)).collect();
+    let rows: Vec<Vec<f64>> =
+        samples.iter().map(|(s, _)| variances.iter().map(|v| (-0.5 * v * s * s).exp()).collect()).collect();
     // The total is to be exact.
     let weight = |i: usize| if i == 0 { 1e3 } else { 1.0 };
     let n = variances.len();
@@ -234,13 +225,7 @@ struct Solver {
 }
 
 impl Solver {
-    fn new(
-        &Transport {
-            incidence,
-            mut order,
-        }: &Transport,
-        medium: &Medium,
-    ) -> Result<Self, Error> {
+    fn new(&Transport { incidence, mut order }: &Transport, medium: &Medium) -> Result<Self, Error> {
         let refuse = |needs| Err(number("transport: order", order as f64, needs));
         if order > 2 {
             return refuse("0, 1 or 2");
@@ -254,10 +239,7 @@ impl Solver {
         let mut slabs: Vec<Slab> = Vec::new();
         let mut tau = 0.0;
         for layer in medium.layers() {
-            let mut slab = Slab {
-                tau,
-                ..Slab::new(layer, order)
-            };
+            let mut slab = Slab { tau, ..Slab::new(layer, order) };
             tau += slab.sigma_t * slab.thickness_mm;
             // What lies below sends nothing back.
             let deep = slab.thickness_mm > slab.depth_mm();
@@ -280,14 +262,8 @@ impl Solver {
             directions: DIRECTIONS.map(|n| directions(n, eta)),
             slabs,
             incoming: match incidence {
-                Incidence::Normal => vec![Incoming {
-                    mu: 1.0,
-                    share: 1.0,
-                }],
-                Incidence::Cosine => gauss(2 * DIRECTIONS[0])
-                    .into_iter()
-                    .map(refracted)
-                    .collect(),
+                Incidence::Normal => vec![Incoming { mu: 1.0, share: 1.0 }],
+                Incidence::Cosine => gauss(2 * DIRECTIONS[0]).into_iter().map(refracted).collect(),
             },
             incidence,
             order,
@@ -297,10 +273,7 @@ impl Solver {
     /// The least and the highest frequency that a response needs, in rad/mm.
     fn frequencies(&self) -> (f64, f64) {
         let scattering = self.slabs.iter().filter(|s| s.sigma_s > 0.0);
-        let first = scattering
-            .clone()
-            .map(|s| s.tau)
-            .fold(f64::INFINITY, f64::min);
+        let first = scattering.clone().map(|s| s.tau).fold(f64::INFINITY, f64::min);
         // What is deeper than this is not seen.
         let seen = scattering.filter(|s| s.tau < first + 8.0);
         let densest = seen.clone().map(|s| s.sigma_t).fold(0.0, f64::max);
@@ -325,11 +298,7 @@ impl Solver {
         let turns = |slab: &Slab| {
             let free = 1.0 / slab.sigma_t;
             // Gaps do not fade, but end.
-            let free = if slab.sigma_s > 0.0 {
-                free
-            } else {
-                free.min(4.0 * slab.thickness_mm)
-            };
+            let free = if slab.sigma_s > 0.0 { free } else { free.min(4.0 * slab.thickness_mm) };
             (2.0 - 0.5 * slab.tau).max(0.0) * s * free
         };
         let turns = self.slabs.iter().map(turns).fold(0.0, f64::max);
@@ -339,11 +308,7 @@ impl Solver {
     }
 
     /// One frequency, with the B harmonics (l, m) of `basis`, of which there are P pairs.
-    fn solve_basis<const B: usize, const P: usize>(
-        &self,
-        s: f64,
-        basis: [(usize, usize); B],
-    ) -> Split {
+    fn solve_basis<const B: usize, const P: usize>(&self, s: f64, basis: [(usize, usize); B]) -> Split {
         let azimuths = self.azimuths(s);
         let coarse = azimuths.len() > 8 && self.incidence == Incidence::Normal;
         let cells = &self.meshes[usize::from(coarse)];
@@ -404,10 +369,7 @@ impl Solver {
         let mut through = Complex::ONE;
         for (ray, cell) in rays.iter_mut().zip(cells) {
             let sigma_t = self.slabs[cell.slab].sigma_t;
-            *ray = Ray::new(
-                Complex::new(sigma_t, wave) * (cell.thickness_mm / mu),
-                through,
-            );
+            *ray = Ray::new(Complex::new(sigma_t, wave) * (cell.thickness_mm / mu), through);
             through = through * ray.pass;
         }
     }
@@ -421,8 +383,7 @@ impl Solver {
             for cos_phi in azimuths {
                 let mut through = Complex::ONE;
                 for slab in &self.slabs {
-                    let fade =
-                        Complex::new(slab.sigma_t * (1.0 + d.mu), s * sin * cos_phi) * (1.0 / d.mu);
+                    let fade = Complex::new(slab.sigma_t * (1.0 + d.mu), s * sin * cos_phi) * (1.0 / d.mu);
                     let pass = match slab.thickness_mm {
                         f64::INFINITY => Complex::default(),
                         mm => (fade * mm).exp_neg(),

@@ -48,21 +48,13 @@ struct Sample {
 
 impl Responses {
     pub(super) fn new(kernels: &Kernels, levels: usize) -> Self {
-        let mut responses = Self {
-            samples: Vec::new(),
-            columns: vec![Vec::new(); kernels.variances_px2(levels).len()],
-        };
+        let mut responses =
+            Self { samples: Vec::new(), columns: vec![Vec::new(); kernels.variances_px2(levels).len()] };
         for soft in [true, false] {
             let of_axis = SHIFTS.iter().map(|shift| ([1, 0], *shift));
-            let oblique = OBLIQUE
-                .iter()
-                .flat_map(|across| OBLIQUE_SHIFTS.map(|shift| (*across, shift)));
+            let oblique = OBLIQUE.iter().flat_map(|across| OBLIQUE_SHIFTS.map(|shift| (*across, shift)));
             for (across, shift) in of_axis.chain(oblique) {
-                let edge = Edge {
-                    across,
-                    soft,
-                    shift,
-                };
+                let edge = Edge { across, soft, shift };
                 edge.pass(kernels, levels, &edge.pixels(), &mut responses);
             }
         }
@@ -158,9 +150,7 @@ fn lattice_variance(s: f64) -> f64 {
 
 fn product(rows: &[(i32, f64)], columns: &[(i32, f64)]) -> Taps {
     let pair = |(x, u): &(i32, f64), (y, v): &(i32, f64)| ([*x, *y], u * v);
-    let taps = rows
-        .iter()
-        .flat_map(|r| columns.iter().map(move |c| pair(r, c)));
+    let taps = rows.iter().flat_map(|r| columns.iter().map(move |c| pair(r, c)));
     taps.collect()
 }
 
@@ -195,21 +185,14 @@ impl Signal {
         let taps = projected(&product(&row, &row), across);
         let first = self.first / 2;
         let values = (0..self.values.len() as i32 / 2).map(|i| self.sum(2 * (first + i), &taps));
-        Self {
-            first,
-            values: values.collect(),
-        }
+        Self { first, values: values.collect() }
     }
 }
 
 /// The pixels of the next level that a pixel is interpolated from, of one axis.
 fn upsampling(pixel: i32) -> [(i32, f64); 2] {
     let near = pixel.div_euclid(2);
-    let other = if pixel.rem_euclid(2) == 0 {
-        near - 1
-    } else {
-        near + 1
-    };
+    let other = if pixel.rem_euclid(2) == 0 { near - 1 } else { near + 1 };
     [(near, 0.75), (other, 0.25)]
 }
 
@@ -248,10 +231,7 @@ impl Edge {
             true => step(self.distance(k), 1.0),
             false => f64::from(self.distance(k) > 0.0),
         };
-        let frame = Signal {
-            first: -half,
-            values: (-half..half).map(edge).collect(),
-        };
+        let frame = Signal { first: -half, values: (-half..half).map(edge).collect() };
         let [a, b] = self.across;
         let ks: Vec<i32> = pixels.iter().map(|[x, y]| a * x + b * y).collect();
         to.samples.extend(ks.iter().map(|k| Sample {
@@ -276,17 +256,13 @@ impl Edge {
             let from: Vec<_> = pixels
                 .iter()
                 .map(|[x, y]| {
-                    projected(
-                        &product(&interpolation(*x, l), &interpolation(*y, l)),
-                        self.across,
-                    )
+                    projected(&product(&interpolation(*x, l), &interpolation(*y, l)), self.across)
                 })
                 .collect();
             for blur in kernels.coarse.blurs() {
                 let taps = projected(&blur.taps(l), self.across);
-                let mean = |from: &Vec<(i32, f64)>| {
-                    from.iter().map(|(k, w)| w * signal.sum(*k, &taps)).sum()
-                };
+                let mean =
+                    |from: &Vec<(i32, f64)>| from.iter().map(|(k, w)| w * signal.sum(*k, &taps)).sum();
                 add(&mut from.iter().map(mean));
             }
         }
@@ -320,9 +296,7 @@ mod tests {
     #[test]
     fn lattices_have_the_variance_of_the_shader() {
         let shader = crate::exact::gaussian_sum::SHADER;
-        let variances: Vec<f32> = (0..=40)
-            .map(|i| 1e-3 * 399f32.powf(i as f32 / 40.0))
-            .collect();
+        let variances: Vec<f32> = (0..=40).map(|i| 1e-3 * 399f32.powf(i as f32 / 40.0)).collect();
         let inputs: Vec<_> = variances.iter().map(|v| [*v, 1.0, 0.0, 0.0]).collect();
         let call = "vec4f(lattice_variance(x.x, x.y), 0.0, 0.0, 0.0)";
         let found = crate::wgsl::evaluate(shader, call, &inputs);
@@ -341,27 +315,20 @@ mod tests {
     fn every_kernel_has_its_variance() {
         // The second moment of the response to an edge is the sum of all variances.
         for across in [[1, 0], OBLIQUE[0]] {
-            let edge = Edge {
-                across,
-                soft: true,
-                shift: 0.3,
-            };
+            let edge = Edge { across, soft: true, shift: 0.3 };
             // One pixel after the other along a row.
             let pixels: Vec<_> = (-160..160).map(|x| [x, 0]).collect();
             for kernels in KERNELS {
                 let variances = kernels.variances_px2(3);
-                let mut passed = Responses {
-                    samples: Vec::new(),
-                    columns: vec![Vec::new(); variances.len()],
-                };
+                let mut passed =
+                    Responses { samples: Vec::new(), columns: vec![Vec::new(); variances.len()] };
                 edge.pass(&kernels, 3, &pixels, &mut passed);
                 // Differences of neighbours see the edge through the step between them.
                 let between = (passed.samples[1].x - passed.samples[0].x).powi(2) / 12.0;
                 for (column, variance) in passed.columns.iter().zip(variances) {
                     let differences = column.windows(2).zip(passed.samples.windows(2));
-                    let moment: f64 = differences
-                        .map(|(c, s)| (c[1] - c[0]) * (0.5 * (s[0].x + s[1].x)).powi(2))
-                        .sum();
+                    let moment: f64 =
+                        differences.map(|(c, s)| (c[1] - c[0]) * (0.5 * (s[0].x + s[1].x)).powi(2)).sum();
                     let found = moment - 1.0 - between;
                     assert!(
                         (found - variance).abs() < 0.02 * variance + 1e-3,

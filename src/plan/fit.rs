@@ -63,24 +63,17 @@ pub(super) fn fit(
 /// far below a pixel, to where the last level is as wide as that of any profile.
 fn scales(profiles: &[Profile]) -> (f64, usize) {
     let widths = || profiles.iter().map(widest_mm).filter(|w| *w > 0.0);
-    let (Some(widest), Some(narrowest)) = (widths().reduce(f64::max), widths().reduce(f64::min))
-    else {
+    let (Some(widest), Some(narrowest)) = (widths().reduce(f64::max), widths().reduce(f64::min)) else {
         return (0.0, 2);
     };
     let first = (LEAST_PX / widest).log2();
     let last = (f64::from(1 << FITTED_LEVELS) / narrowest).log2();
-    (
-        first,
-        ((last - first) * ROWS_PER_OCTAVE).ceil() as usize + 2,
-    )
+    (first, ((last - first) * ROWS_PER_OCTAVE).ceil() as usize + 2)
 }
 
 /// σ of the widest Gaussian.
 fn widest_mm(profile: &Profile) -> f64 {
-    let variances = profile
-        .gaussians()
-        .iter()
-        .map(|g| f64::from(g.variance_mm2));
+    let variances = profile.gaussians().iter().map(|g| f64::from(g.variance_mm2));
     variances.fold(0.0, f64::max).sqrt()
 }
 
@@ -107,11 +100,7 @@ impl Fit<'_> {
     fn rows(&self, count: usize, hopeless: f64) -> Option<Vec<Mixture>> {
         // Each row by itself …
         let mut fits = Vec::new();
-        let mut goals = Goals {
-            columns: &self.responses.columns,
-            at: Vec::new(),
-            between: Vec::new(),
-        };
+        let mut goals = Goals { columns: &self.responses.columns, at: Vec::new(), between: Vec::new() };
         let mut weights: Vec<Channels<Vec<f64>>> = Vec::new();
         let mut errors = Vec::new();
         for i in 0..count {
@@ -166,17 +155,11 @@ impl Fit<'_> {
         // Level 1 stays for profiles of hardly any width.
         let widest_px2 = widest_px.powi(2).max(4.0);
         let variances_px2 = self.kernels.variances_px2(FITTED_LEVELS);
-        let square = self
-            .kernels
-            .fine
-            .square_px2
-            .map(|_| self.kernels.fine.len());
+        let square = self.kernels.fine.square_px2.map(|_| self.kernels.fine.len());
         let fit = |without: Option<usize>, limit: f64| {
             let used = |j: usize| variances_px2[j] <= widest_px2 && Some(j) != without;
             let mut fit = CHANNELS.map(|_| Minimax::new(columns.len(), used));
-            let kept = CHANNELS
-                .into_iter()
-                .all(|c| fit[c].solve(columns, &targets[c], limit));
+            let kept = CHANNELS.into_iter().all(|c| fit[c].solve(columns, &targets[c], limit));
             (fit, kept)
         };
         if square.is_some() {
@@ -235,30 +218,14 @@ impl Goals<'_> {
     }
 
     /// From row `first` to the next, for the one that has `share` of the weights there, given the other's.
-    fn on_the_way(
-        &self,
-        first: usize,
-        c: usize,
-        other: &[f64],
-        share: fn(f64) -> f64,
-    ) -> Vec<Target> {
+    fn on_the_way(&self, first: usize, c: usize, other: &[f64], share: fn(f64) -> f64) -> Vec<Target> {
         let other = mix(self.columns, other);
         let target = |(part, wanted): (f64, &Channels<Vec<f64>>)| {
             let share = share(part);
-            let rest = wanted[c]
-                .iter()
-                .zip(&other)
-                .map(|(w, o)| w - (1.0 - share) * o);
-            Target {
-                share,
-                ..Target::new(rest.collect())
-            }
+            let rest = wanted[c].iter().zip(&other).map(|(w, o)| w - (1.0 - share) * o);
+            Target { share, ..Target::new(rest.collect()) }
         };
-        BETWEEN
-            .into_iter()
-            .zip(&self.between[first])
-            .map(target)
-            .collect()
+        BETWEEN.into_iter().zip(&self.between[first]).map(target).collect()
     }
 
     fn errors_at(&self, row: usize, weights: &Channels<Vec<f64>>) -> Channels<f64> {
@@ -280,9 +247,7 @@ impl Goals<'_> {
         let stays = CHANNELS.map(|_| stays.clone());
         let [r, g, b] = here;
         Mixture {
-            weights: (0..r.len())
-                .map(|j| [r[j], g[j], b[j]].map(|w| w as f32))
-                .collect(),
+            weights: (0..r.len()).map(|j| [r[j], g[j], b[j]].map(|w| w as f32)).collect(),
             predicted_error: largest(self.errors_at(row, here)).max(until_next) as f32,
             unscattered_error: largest(self.errors_at(row, &stays)) as f32,
         }
@@ -351,19 +316,13 @@ mod tests {
         };
         let skin = |width: f32| {
             let skin = Profile::SKIN;
-            let terms = skin
-                .gaussians()
-                .iter()
-                .map(|g| (g.variance_mm2 * width * width, g.weight));
+            let terms = skin.gaussians().iter().map(|g| (g.variance_mm2 * width * width, g.weight));
             of(&terms.collect::<Vec<_>>())
         };
         let eight = (0..8).map(|i| {
             let x = i as f32;
             let green = 0.2 + 0.1 * (1.7 * x).sin().abs();
-            (
-                0.003 * 4f32.powf(0.9 * x),
-                [1.0 / (1.0 + x), green, (-0.8 * x).exp()],
-            )
+            (0.003 * 4f32.powf(0.9 * x), [1.0 / (1.0 + x), green, (-0.8 * x).exp()])
         });
         vec![
             skin(1.0),
@@ -382,11 +341,7 @@ mod tests {
             for profile in profiles() {
                 let since = std::time::Instant::now();
                 let fit = fit(&[profile], 1.0 / 255.0, kernels, f32::INFINITY).unwrap();
-                println!(
-                    "{:.6} predicted, {:?}",
-                    fit.predicted_error(),
-                    since.elapsed()
-                );
+                println!("{:.6} predicted, {:?}", fit.predicted_error(), since.elapsed());
                 let fitted = scales(&[profile]).1;
                 for (i, pair) in fit.profiles[0][..fitted].windows(2).enumerate() {
                     for part in [0.0, 0.25, 0.5, 0.75] {
@@ -396,25 +351,15 @@ mod tests {
                             let between = |(a, b): (&[f32; 3], &[f32; 3])| {
                                 (1.0 - part) * f64::from(a[c]) + part * f64::from(b[c])
                             };
-                            let weights: Vec<f64> = pair[0]
-                                .weights
-                                .iter()
-                                .zip(&pair[1].weights)
-                                .map(between)
-                                .collect();
+                            let weights: Vec<f64> =
+                                pair[0].weights.iter().zip(&pair[1].weights).map(between).collect();
                             let (fitted, beyond) = weights.split_at(responses.columns.len());
                             assert!(beyond.iter().all(|w| *w == 0.0));
-                            let error = largest_residual(
-                                &responses.columns,
-                                fitted,
-                                &[Target::new(wanted)],
-                            );
+                            let error =
+                                largest_residual(&responses.columns, fitted, &[Target::new(wanted)]);
                             // Weights are read as f32.
                             let predicted = f64::from(pair[0].predicted_error);
-                            assert!(
-                                error < predicted + 1e-6,
-                                "row {i} + {part}: {error}, {predicted}"
-                            );
+                            assert!(error < predicted + 1e-6, "row {i} + {part}: {error}, {predicted}");
                         }
                     }
                 }
@@ -425,13 +370,7 @@ mod tests {
     #[test]
     fn equal_profiles_have_equal_weights() {
         let other = profiles()[3];
-        let fit = fit(
-            &[Profile::SKIN, other, Profile::SKIN],
-            0.01,
-            KERNELS[0],
-            1.0,
-        )
-        .unwrap();
+        let fit = fit(&[Profile::SKIN, other, Profile::SKIN], 0.01, KERNELS[0], 1.0).unwrap();
         assert_eq!(fit.profiles[0], fit.profiles[2]);
         assert_ne!(fit.profiles[0], fit.profiles[1]);
     }
@@ -439,9 +378,6 @@ mod tests {
     #[test]
     fn rounded_weights_are_one_in_all() {
         let thirds = rounded(vec![1.0 / 3.0; 3]);
-        assert_eq!(
-            thirds.iter().map(|w| (w * STEPS).round()).sum::<f64>(),
-            STEPS
-        );
+        assert_eq!(thirds.iter().map(|w| (w * STEPS).round()).sum::<f64>(), STEPS);
     }
 }

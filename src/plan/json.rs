@@ -43,17 +43,10 @@ impl From<Plan> for Form {
                 max_error: plan.max_error,
                 blurs: weights.kernels.to_string(),
                 first_octave: weights.first_octave,
-                rows: weights
-                    .profiles
-                    .iter()
-                    .map(|rows| rows.iter().map(mixture).collect())
-                    .collect(),
+                rows: weights.profiles.iter().map(|rows| rows.iter().map(mixture).collect()).collect(),
             }
         };
-        Self {
-            profiles: plan.profiles.to_vec(),
-            pyramid: plan.weights().map(pyramid),
-        }
+        Self { profiles: plan.profiles.to_vec(), pyramid: plan.weights().map(pyramid) }
     }
 }
 
@@ -85,20 +78,10 @@ impl Pyramid {
             true => Ok(()),
             false => Err(Error::Count { input, got, needs }),
         };
-        count(
-            "plan: profiles with rows",
-            self.rows.len(),
-            [profiles.len(); 2],
-        )?;
+        count("plan: profiles with rows", self.rows.len(), [profiles.len(); 2])?;
         let rows = self.rows[0].len();
         count("plan: rows of a profile", rows, [2, MAX_ROWS])?;
-        number(
-            "plan: first_octave",
-            self.first_octave,
-            -OCTAVES,
-            OCTAVES / 2.0,
-            "-120 to 60",
-        )?;
+        number("plan: first_octave", self.first_octave, -OCTAVES, OCTAVES / 2.0, "-120 to 60")?;
         for (profile, of_profile) in self.rows.iter().enumerate() {
             count("plan: rows of a profile", of_profile.len(), [rows; 2])?;
             for (i, row) in of_profile.iter().enumerate() {
@@ -106,13 +89,7 @@ impl Pyramid {
                 count("plan: weights of a row", row.weights.len(), [slots; 2])?;
                 let input = |what: &str| format!("plan: {what} of row {i} of profile {profile}");
                 let (predicted, max) = (row.predicted_error.into(), self.max_error.into());
-                number(
-                    &input("predicted_error"),
-                    predicted,
-                    0.0,
-                    max,
-                    "0 to max_error",
-                )?;
+                number(&input("predicted_error"), predicted, 0.0, max, "0 to max_error")?;
                 let unscattered = row.unscattered_error.into();
                 number(&input("unscattered_error"), unscattered, 0.0, 1.0, "0 to 1")?;
                 let mut sum = [0.0; 3];
@@ -123,13 +100,7 @@ impl Pyramid {
                     }
                 }
                 for sum in sum {
-                    number(
-                        &input("sum of the weights"),
-                        sum,
-                        1.0 - 1e-5,
-                        1.0 + 1e-5,
-                        "1 in every colour",
-                    )?;
+                    number(&input("sum of the weights"), sum, 1.0 - 1e-5, 1.0 + 1e-5, "1 in every colour")?;
                 }
             }
         }
@@ -142,11 +113,7 @@ fn number(input: &str, got: f64, least: f64, most: f64, needs: &'static str) -> 
     if (least..=most).contains(&got) {
         return Ok(());
     }
-    Err(Error::Number {
-        input: input.into(),
-        got,
-        needs,
-    })
+    Err(Error::Number { input: input.into(), got, needs })
 }
 
 impl Plan {
@@ -199,59 +166,19 @@ mod tests {
         for (at, to, says) in [
             ("", json!([]), "plan: got"),
             ("/profiles", json!([]), "profiles: got 0"),
-            (
-                "/profiles/0/gaussians/0/variance_mm2",
-                json!(-1),
-                "variance_mm2",
-            ),
+            ("/profiles/0/gaussians/0/variance_mm2", json!(-1), "variance_mm2"),
             ("/pyramid/max_error", json!(0), "max_error: got 0"),
             ("/pyramid/blurs", json!("none"), "plan: blurs: got \"none\""),
             ("/pyramid/first_octave", json!(1e300), "first_octave"),
-            (
-                "/pyramid/rows",
-                json!([]),
-                "plan: profiles with rows: got 0",
-            ),
-            (
-                "/pyramid/rows/0",
-                json!([]),
-                "plan: rows of a profile: got 0",
-            ),
-            (
-                "/pyramid/rows/0/3/weights",
-                json!([]),
-                "plan: weights of a row: got 0",
-            ),
-            (
-                "/pyramid/rows/0/3/weights/2/1",
-                json!(-0.1),
-                "weight of row 3 of profile 0: got -0.1",
-            ),
-            (
-                "/pyramid/rows/0/3/weights/2/1",
-                json!(1e39),
-                "weight of row 3 of profile 0",
-            ),
-            (
-                "/pyramid/rows/0/3/weights/2/1",
-                json!(0.5),
-                "sum of the weights of row 3 of profile 0",
-            ),
-            (
-                "/pyramid/rows/0/3/predicted_error",
-                json!(0.5),
-                "predicted_error of row 3",
-            ),
-            (
-                "/pyramid/rows/0/3/unscattered_error",
-                json!(2),
-                "unscattered_error of row 3",
-            ),
-            (
-                "/pyramid/rows/0/3/unscattered_error",
-                json!(null),
-                "plan: got",
-            ),
+            ("/pyramid/rows", json!([]), "plan: profiles with rows: got 0"),
+            ("/pyramid/rows/0", json!([]), "plan: rows of a profile: got 0"),
+            ("/pyramid/rows/0/3/weights", json!([]), "plan: weights of a row: got 0"),
+            ("/pyramid/rows/0/3/weights/2/1", json!(-0.1), "weight of row 3 of profile 0: got -0.1"),
+            ("/pyramid/rows/0/3/weights/2/1", json!(1e39), "weight of row 3 of profile 0"),
+            ("/pyramid/rows/0/3/weights/2/1", json!(0.5), "sum of the weights of row 3 of profile 0"),
+            ("/pyramid/rows/0/3/predicted_error", json!(0.5), "predicted_error of row 3"),
+            ("/pyramid/rows/0/3/unscattered_error", json!(2), "unscattered_error of row 3"),
+            ("/pyramid/rows/0/3/unscattered_error", json!(null), "plan: got"),
         ] {
             let error = changed(at, to).unwrap_err().to_string();
             assert!(error.contains(says), "{error} does not say {says}");

@@ -39,11 +39,7 @@ impl Shape {
 
     /// Up to which variance a blur is no more than its three innermost columns.
     pub(crate) fn narrow(self) -> f64 {
-        if self == Self::Nine {
-            self.limit()
-        } else {
-            0.26
-        }
+        if self == Self::Nine { self.limit() } else { 0.26 }
     }
 
     /// `Blur::sharpness` of surface.wgsl: fitted to [`Shape::exponent`] from [`Shape::narrow`] to .97 of
@@ -65,9 +61,7 @@ impl Shape {
     /// Pixels and their weights exp(−r²/2q), 1 in all.
     fn taps(self, q: f64) -> Taps {
         let square = -2..=2;
-        let pixels = square
-            .clone()
-            .flat_map(|y| square.clone().map(move |x| [x, y]));
+        let pixels = square.clone().flat_map(|y| square.clone().map(move |x| [x, y]));
         let mut taps: Taps = pixels
             .filter(|p| self.holds(*p))
             .map(|[x, y]| ([x, y], (-f64::from(x * x + y * y) / (2.0 * q)).exp()))
@@ -125,12 +119,7 @@ pub(crate) struct Kinds {
 impl Kinds {
     /// All of them, the square one last.
     pub(crate) fn blurs(&self) -> impl Iterator<Item = Blur> {
-        let blur = |shape| {
-            move |variance_px2| Blur {
-                variance_px2,
-                shape,
-            }
-        };
+        let blur = |shape| move |variance_px2| Blur { variance_px2, shape };
         let shared = self.variances_px2.iter().copied().map(blur(self.shape));
         shared.chain(self.square_px2.map(blur(Shape::Square)))
     }
@@ -167,28 +156,12 @@ impl Kernels {
 /// scales: of those with as many taps these keep the smallest error.
 pub(crate) const KERNELS: [Kernels; 2] = [
     Kernels {
-        fine: Kinds {
-            shape: Shape::Nine,
-            variances_px2: &[0.3, 0.55],
-            square_px2: None,
-        },
-        coarse: Kinds {
-            shape: Shape::Nine,
-            variances_px2: &[0.9],
-            square_px2: None,
-        },
+        fine: Kinds { shape: Shape::Nine, variances_px2: &[0.3, 0.55], square_px2: None },
+        coarse: Kinds { shape: Shape::Nine, variances_px2: &[0.9], square_px2: None },
     },
     Kernels {
-        fine: Kinds {
-            shape: Shape::Thirteen,
-            variances_px2: &[0.15, 0.45, 0.87],
-            square_px2: Some(1.25),
-        },
-        coarse: Kinds {
-            shape: Shape::Thirteen,
-            variances_px2: &[1.03],
-            square_px2: Some(1.5),
-        },
+        fine: Kinds { shape: Shape::Thirteen, variances_px2: &[0.15, 0.45, 0.87], square_px2: Some(1.25) },
+        coarse: Kinds { shape: Shape::Thirteen, variances_px2: &[1.03], square_px2: Some(1.5) },
     },
 ];
 
@@ -211,17 +184,10 @@ mod tests {
                 let t = variance / shape.limit();
                 let wide = (1.0 - t) * (x / t + y + t * (z + t * w));
                 let narrow = -2.0 * variance * (variance / (2.0 - 2.0 * variance)).ln();
-                let sharpness = if variance < shape.narrow() {
-                    narrow
-                } else {
-                    wide
-                };
+                let sharpness = if variance < shape.narrow() { narrow } else { wide };
                 let found = shape.variance(variance / sharpness);
                 // As far as a cubic goes.
-                assert!(
-                    (found / variance - 1.0).abs() < 0.02,
-                    "{shape:?} {variance}: {found}"
-                );
+                assert!((found / variance - 1.0).abs() < 0.02, "{shape:?} {variance}: {found}");
             }
         }
     }
@@ -238,10 +204,7 @@ mod tests {
                     assert!(by_taps < 0.97 * blur.shape.limit(), "{blur:?} on level {l}");
                 }
             }
-            let deep = kernels
-                .coarse
-                .blurs()
-                .map(|b| b.variance_px2 - own_blur(20));
+            let deep = kernels.coarse.blurs().map(|b| b.variance_px2 - own_blur(20));
             assert!(deep.fold(f64::MAX, f64::min) > 0.0);
         }
     }

@@ -30,11 +30,7 @@ pub(crate) struct Target {
 impl Target {
     /// That all of the mixture is to be these values.
     pub(crate) fn new(values: Vec<f64>) -> Self {
-        Self {
-            share: 1.0,
-            values,
-            allowance: 0.0,
-        }
+        Self { share: 1.0, values, allowance: 0.0 }
     }
 
     /// The largest |share·mixed − value| − allowance, and where.
@@ -125,9 +121,7 @@ impl Minimax {
                 return false;
             }
             let mixed = mix(columns, x);
-            let residuals = targets
-                .iter()
-                .map(|target| (target, target.largest_residual(&mixed)));
+            let residuals = targets.iter().map(|target| (target, target.largest_residual(&mixed)));
             let worst = residuals.max_by(|a, b| a.1.0.total_cmp(&b.1.0));
             let least = (0..n).min_by(|i, j| x[*i].total_cmp(&x[*j]));
             let (Some((target, (residual, i))), Some(least)) = (worst, least) else {
@@ -174,18 +168,12 @@ impl Minimax {
     /// there is none, which rounding alone can bring about: some t meets all constraints.
     fn exchange(&mut self, gradient: &[f64], constant: f64, bound: Option<usize>) -> Option<usize> {
         let t = self.point.len() - 1;
-        let along: Vec<f64> = self
-            .inverse
-            .iter()
-            .map(|column| dot(gradient, column))
-            .collect();
+        let along: Vec<f64> = self.inverse.iter().map(|column| dot(gradient, column)).collect();
         let candidates = || (0..=t).filter(|k| !self.stays[*k] && along[*k] > ROUNDING);
         // Of those that get to 0 together the one that divides best (P. M. J. Harris, Pivot selection
         // methods of the Devex LP code, Mathematical Programming 5, 1973).
         let step = |k: usize, slack: f64| (self.inverse[k][t].max(0.0) + slack) / along[k];
-        let first = candidates()
-            .map(|k| step(k, ROUNDING))
-            .fold(f64::INFINITY, f64::min);
+        let first = candidates().map(|k| step(k, ROUNDING)).fold(f64::INFINITY, f64::min);
         let together = candidates().filter(|k| step(*k, 0.0) <= first);
         let out = together.max_by(|i, j| along[*i].total_cmp(&along[*j]))?;
         let pivot: Vec<f64> = self.inverse[out].iter().map(|p| p / along[out]).collect();
@@ -213,8 +201,7 @@ impl Minimax {
     /// The x that was found, 1 in all.
     pub(crate) fn weights(&self) -> Vec<f64> {
         let mut x = self.point[..self.point.len() - 1].to_vec();
-        x.iter_mut()
-            .for_each(|x| *x = if *x > ACCURACY { *x } else { 0.0 });
+        x.iter_mut().for_each(|x| *x = if *x > ACCURACY { *x } else { 0.0 });
         let sum: f64 = x.iter().sum();
         x.iter_mut().for_each(|x| *x /= sum);
         x

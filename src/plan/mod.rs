@@ -87,11 +87,7 @@ impl Plan {
     }
 
     fn of(profiles: &[Profile], max_error: f32, weights: Weights) -> Self {
-        Self {
-            max_error,
-            profiles: profiles.into(),
-            weights: Some(Arc::new(weights)),
-        }
+        Self { max_error, profiles: profiles.into(), weights: Some(Arc::new(weights)) }
     }
 
     /// Fits the cheapest plan whose error on flat edges is at most `max_error`, in units of the radiance
@@ -128,11 +124,7 @@ impl Plan {
     /// No profile, or more than [`MAX_PROFILES`](crate::MAX_PROFILES).
     pub fn exact(profiles: &[Profile]) -> Result<Self, Error> {
         validate::profiles(profiles)?;
-        Ok(Self {
-            max_error: EXACT_ERROR,
-            profiles: profiles.into(),
-            weights: None,
-        })
+        Ok(Self { max_error: EXACT_ERROR, profiles: profiles.into(), weights: None })
     }
 
     /// What it was made for.
@@ -175,9 +167,7 @@ impl Plan {
     /// The rows of a profile, counted from 0, from the smallest scale to the largest; none of one
     /// that the plan was not made for, or of the exact effect.
     pub fn rows(&self, profile: usize) -> &[Row] {
-        self.weights()
-            .and_then(|w| w.profiles.get(profile))
-            .map_or(&[], |rows| rows)
+        self.weights().and_then(|w| w.profiles.get(profile)).map_or(&[], |rows| rows)
     }
 
     /// Texel fetches for a pixel of skin of a profile, counted from 0, on flat skin that faces the camera;
@@ -210,12 +200,7 @@ fn check_max_error(max_error: f32) -> Result<(), Error> {
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        writeln!(
-            f,
-            "error {} asked for, {:.5} predicted",
-            self.max_error,
-            self.predicted_error()
-        )?;
+        writeln!(f, "error {} asked for, {:.5} predicted", self.max_error, self.predicted_error())?;
         let Some(weights) = self.weights() else {
             return writeln!(f, "the exact effect");
         };
@@ -223,12 +208,7 @@ impl fmt::Display for Plan {
         for (rows, id) in weights.profiles.iter().zip(1..) {
             writeln!(f, "profile {id}:  px/mm   error    level  weights")?;
             for row in rows {
-                let Row {
-                    px_per_mm,
-                    predicted_error,
-                    level,
-                    ..
-                } = row;
+                let Row { px_per_mm, predicted_error, level, .. } = row;
                 write!(f, "  {px_per_mm:14.4}  {predicted_error:.5}  {level:5} ")?;
                 for w in &row.weights {
                     let [r, g, b] = w.map(|c| (100.0 * c).round());
@@ -277,10 +257,7 @@ mod tests {
 
     #[test]
     fn what_is_said_to_be_reachable_is() {
-        let one = crate::Gaussian {
-            variance_mm2: 1.0,
-            weight: [1.0; 3],
-        };
+        let one = crate::Gaussian { variance_mm2: 1.0, weight: [1.0; 3] };
         for profile in [Profile::SKIN, Profile::new(&[one]).unwrap()] {
             let since = std::time::Instant::now();
             let refused = Plan::new(&[profile], 1e-4);
@@ -295,16 +272,9 @@ mod tests {
 
     #[test]
     fn profiles_of_any_width_have_a_plan() {
-        let of = |variance_mm2| crate::Gaussian {
-            variance_mm2,
-            weight: [1.0; 3],
-        };
-        for gaussians in [
-            vec![of(0.0)],
-            vec![of(1e-12)],
-            vec![of(1e6)],
-            vec![of(1e-12), of(1.0), of(1e6)],
-        ] {
+        let of = |variance_mm2| crate::Gaussian { variance_mm2, weight: [1.0; 3] };
+        for gaussians in [vec![of(0.0)], vec![of(1e-12)], vec![of(1e6)], vec![of(1e-12), of(1.0), of(1e6)]]
+        {
             let profile = Profile::new(&gaussians).unwrap();
             let plan = Plan::new(&[profile], 0.1).unwrap();
             assert!(!plan.is_exact());

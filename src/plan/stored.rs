@@ -26,11 +26,7 @@ impl Stored {
             for (slot, steps) in *stored {
                 weights[*slot] = steps.map(|s| (f64::from(s) / super::fit::STEPS) as f32);
             }
-            Mixture {
-                weights,
-                predicted_error: *predicted_error,
-                unscattered_error: *unscattered_error,
-            }
+            Mixture { weights, predicted_error: *predicted_error, unscattered_error: *unscattered_error }
         };
         let rows = self.rows.iter().map(mixture).collect();
         Weights::new(kernels, self.first_octave, vec![rows])
@@ -54,12 +50,8 @@ mod tests {
     fn stored_plans_are_what_is_fitted() {
         for (name, stored) in [("SKIN", Plan::skin()), ("SKIN_FAST", Plan::skin_fast())] {
             let refit = refit(stored.max_error());
-            let fitted = |plan: &Plan| {
-                (
-                    plan.max_error(),
-                    plan.weights().map(|w| (w.kernels, w.row_count())),
-                )
-            };
+            let fitted =
+                |plan: &Plan| (plan.max_error(), plan.weights().map(|w| (w.kernels, w.row_count())));
             assert_eq!(fitted(&stored), fitted(&refit), "{name}: {COMMAND}");
             for (stored, refit) in stored.rows(0).iter().zip(refit.rows(0)) {
                 // Another machine's exp may differ in its last digit, and move a weight by a step.
@@ -116,11 +108,7 @@ mod tests {
             }
             text += "    ],\n};\n";
         }
-        std::fs::write(
-            concat!(env!("CARGO_MANIFEST_DIR"), "/src/plan/skin.rs"),
-            text,
-        )
-        .unwrap();
+        std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/src/plan/skin.rs"), text).unwrap();
     }
 
     /// A row, in lines that are not too long.
@@ -130,12 +118,7 @@ mod tests {
         let [predicted, unscattered] = [row.predicted_error, row.unscattered_error].map(up);
         let mut text = format!("        ({predicted:.6}, {unscattered:.6}, &[");
         let mut column = text.len();
-        for (slot, weight) in row
-            .weights
-            .iter()
-            .enumerate()
-            .filter(|(_, w)| **w != [0.0; 3])
-        {
+        for (slot, weight) in row.weights.iter().enumerate().filter(|(_, w)| **w != [0.0; 3]) {
             let steps = weight.map(|w| (f64::from(w) * fit::STEPS).round() as u32);
             let entry = format!("({slot}, {steps:?}), ");
             if column + entry.len() > 106 {

@@ -45,12 +45,7 @@ pub(super) struct Mixture {
 
 impl Weights {
     pub(super) fn new(kernels: Kernels, first_octave: f64, profiles: Vec<Vec<Mixture>>) -> Self {
-        let mut weights = Self {
-            kernels,
-            levels: MAX_LEVELS,
-            first_octave,
-            profiles: Vec::new(),
-        };
+        let mut weights = Self { kernels, levels: MAX_LEVELS, first_octave, profiles: Vec::new() };
         let slots: Vec<usize> = (1..=MAX_LEVELS + 1).map(|l| weights.slot(l, 0)).collect();
         for rows in profiles {
             let mut level = 0;
@@ -65,9 +60,7 @@ impl Weights {
                     unscattered_error: mixture.unscattered_error,
                 }
             };
-            weights
-                .profiles
-                .push(rows.into_iter().enumerate().map(row).collect());
+            weights.profiles.push(rows.into_iter().enumerate().map(row).collect());
         }
         weights
     }
@@ -126,15 +119,8 @@ impl Weights {
         let i = (octave * ROWS_PER_OCTAVE).clamp(0.0, (rows.len() - 2) as f64) as usize;
         let used = |slot: usize| rows[i..i + 2].iter().any(|r| r.weights[slot] != [0.0; 3]);
         let blurs = |l: usize| {
-            let kinds = if l == 0 {
-                &self.kernels.fine
-            } else {
-                &self.kernels.coarse
-            };
-            let taps = kinds
-                .blurs()
-                .enumerate()
-                .filter(|(j, _)| used(self.slot(l, *j)));
+            let kinds = if l == 0 { &self.kernels.fine } else { &self.kernels.coarse };
+            let taps = kinds.blurs().enumerate().filter(|(j, _)| used(self.slot(l, *j)));
             taps.map(|(_, b)| b.shape.count()).max().unwrap_or(0)
         };
         let top = (1..=self.levels).rev().find(|l| blurs(*l) > 0).unwrap_or(0);

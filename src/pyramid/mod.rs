@@ -6,8 +6,7 @@ mod passes;
 mod scratch;
 
 use wgpu::{
-    BindGroup, BindGroupLayout, BindingResource, Buffer, Device, Queue, Sampler, TextureFormat,
-    TextureView,
+    BindGroup, BindGroupLayout, BindingResource, Buffer, Device, Queue, Sampler, TextureFormat, TextureView,
 };
 
 use crate::frame::Viewport;
@@ -90,21 +89,9 @@ impl Pyramid {
     pub(crate) fn new(device: &Device, output: Output, plan: &Weights) -> Result<Self, Error> {
         let limits = device.limits();
         for (limit, got, needs) in [
-            (
-                "max_storage_buffers_per_shader_stage",
-                limits.max_storage_buffers_per_shader_stage,
-                4,
-            ),
-            (
-                "max_compute_invocations_per_workgroup",
-                limits.max_compute_invocations_per_workgroup,
-                64,
-            ),
-            (
-                "max_compute_workgroup_size_x",
-                limits.max_compute_workgroup_size_x,
-                64,
-            ),
+            ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 4),
+            ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 64),
+            ("max_compute_workgroup_size_x", limits.max_compute_workgroup_size_x, 64),
         ] {
             if got < needs {
                 return Err(Error::Limit { limit, got, needs });
@@ -278,11 +265,7 @@ impl Pyramid {
             frame: blur(&passes.frame, 0),
             copy: group(
                 &passes.copy_layout,
-                &[
-                    (0, view.clone()),
-                    (4, Texture(&read.irradiance)),
-                    (5, Texture(&read.albedo)),
-                ],
+                &[(0, view.clone()), (4, Texture(&read.irradiance)), (5, Texture(&read.albedo))],
             ),
             read,
         }
@@ -315,11 +298,7 @@ impl Pyramid {
         encoder.copy_buffer_to_buffer(&scratch.no_draws, 0, &scratch.draws, 0, draws);
         encoder.clear_buffer(&scratch.contents, 0, None);
         // Nothing is drawn: it clears what is packed.
-        recorder.draw(
-            "subsurface::pyramid clear",
-            &[&base.light, &base.shape],
-            false,
-        );
+        recorder.draw("subsurface::pyramid clear", &[&base.light, &base.shape], false);
         {
             let [x, y] = base.tiles;
             let mut pass = recorder.dispatch("subsurface::pyramid pack");

@@ -1,8 +1,8 @@
 //! The pipelines, and what they bind.
 
 use wgpu::{
-    BindGroupLayout, BindingType, ColorWrites, ComputePipeline, Device, PrimitiveTopology,
-    RenderPipeline, ShaderModule, ShaderStages, TextureFormat,
+    BindGroupLayout, BindingType, ColorWrites, ComputePipeline, Device, PrimitiveTopology, RenderPipeline,
+    ShaderModule, ShaderStages, TextureFormat,
 };
 
 use crate::Output;
@@ -121,13 +121,7 @@ impl Passes {
         ];
         let frame: Vec<_> = level
             .into_iter()
-            .chain([
-                (4, FLOATS),
-                (5, FLOATS),
-                (13, UNIFORM),
-                (14, FLOATS),
-                (15, UINTS),
-            ])
+            .chain([(4, FLOATS), (5, FLOATS), (13, UNIFORM), (14, FLOATS), (15, UINTS)])
             .collect();
         let copy_label = "subsurface::pyramid fs_copy";
         let copy_layout = gpu::layout(
@@ -156,25 +150,12 @@ impl Passes {
             list_tiles: compute(
                 "list_tiles",
                 LIST_TILES,
-                &[
-                    (0, UNIFORM),
-                    (9, UNIFORM),
-                    (10, READ),
-                    (11, WRITE),
-                    (12, WRITE),
-                ],
+                &[(0, UNIFORM), (9, UNIFORM), (10, READ), (11, WRITE), (12, WRITE)],
             ),
             downsample: over_tiles(
                 "fs_downsample",
                 &[("vs_tile", DOWNSAMPLE); 2],
-                &[
-                    (0, UNIFORM),
-                    (1, UNIFORM),
-                    (2, READ),
-                    (7, FILTERED),
-                    (8, UINTS),
-                    (12, SAMPLER),
-                ],
+                &[(0, UNIFORM), (1, UNIFORM), (2, READ), (7, FILTERED), (8, UINTS), (12, SAMPLER)],
                 &[LIGHT, SHAPE],
                 None,
             ),
@@ -187,11 +168,7 @@ impl Passes {
             ),
             frame: over_tiles(
                 "fs_frame",
-                &[
-                    ("vs_corner", PLANAR),
-                    ("vs_tile", GENERAL),
-                    ("vs_tile", DIRECT),
-                ],
+                &[("vs_corner", PLANAR), ("vs_tile", GENERAL), ("vs_tile", DIRECT)],
                 &frame,
                 &[],
                 Some(&plan.kernels.fine),

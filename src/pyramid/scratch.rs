@@ -167,11 +167,7 @@ impl Scratch {
             let [width, height] = padded(size);
             device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
-                size: wgpu::Extent3d {
-                    width,
-                    height,
-                    depth_or_array_layers: 1,
-                },
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
                 mip_level_count: 1 + last as u32,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
@@ -215,14 +211,8 @@ impl Scratch {
             gpu::uniform_buffer::<[UVec4; 1 + MAX_LEVELS]>(device, "subsurface::pyramid grids");
         queue.write_buffer(&grids_buffer, 0, bytemuck::bytes_of(&grids));
         let no_draws: Vec<u32> = [4u32, 0, 0, 0].repeat(CLASSES as usize * levels.len());
-        let mean = |l| {
-            gpu::scratch_texture(
-                device,
-                "subsurface::pyramid mean",
-                size_of_level(size, l),
-                LIGHT,
-            )
-        };
+        let mean =
+            |l| gpu::scratch_texture(device, "subsurface::pyramid mean", size_of_level(size, l), LIGHT);
         Self {
             size,
             view: gpu::uniform_buffer::<View>(device, "subsurface::pyramid view"),
@@ -277,11 +267,7 @@ fn steps(plan: &Weights, last: usize) -> [Step; STEPS] {
     let mut steps = [Step::default(); STEPS];
     let mut next = steps.iter_mut();
     for l in 0..=last {
-        let kinds = if l == 0 {
-            plan.kernels.fine
-        } else {
-            plan.kernels.coarse
-        };
+        let kinds = if l == 0 { plan.kernels.fine } else { plan.kernels.coarse };
         let variances: Vec<f32> = kinds.blurs().map(|b| b.variance_px2 as f32).collect();
         for (pair, j) in variances.chunks(2).zip((0..).step_by(2)) {
             if let Some(step) = next.next() {
@@ -297,11 +283,7 @@ fn steps(plan: &Weights, last: usize) -> [Step; STEPS] {
 }
 
 fn level_settings(plan: &Weights, l: usize, last: usize, level: &LevelScratch) -> Level {
-    let kinds = if l == 0 {
-        plan.kernels.fine
-    } else {
-        plan.kernels.coarse
-    };
+    let kinds = if l == 0 { plan.kernels.fine } else { plan.kernels.coarse };
     let mut blurs = [Blur::zeroed(); 4];
     for (j, kind) in kinds.blurs().enumerate() {
         let square = kind.shape == Shape::Square;
@@ -346,10 +328,7 @@ mod tests {
             format!("const LEVELS = {:#x}u;", (1 << levels) - 1),
             format!("const DIFFICULTY_SHIFT = {levels}u;"),
             format!("const PROFILE_SHIFT = {profiles}u;"),
-            format!(
-                "const ROWS_PER_OCTAVE = {:.1};",
-                crate::plan::ROWS_PER_OCTAVE
-            ),
+            format!("const ROWS_PER_OCTAVE = {:.1};", crate::plan::ROWS_PER_OCTAVE),
         ] {
             assert!(shader.contains(&constant), "{constant}");
         }
@@ -380,40 +359,13 @@ mod tests {
                 first_direct
             }
         );
-        assert_layout!(
-            &PLANAR.concat(),
-            "Blur",
-            Blur {
-                variance,
-                own,
-                limit,
-                narrow,
-                sharpness,
-                slot
-            }
-        );
+        assert_layout!(&PLANAR.concat(), "Blur", Blur { variance, own, limit, narrow, sharpness, slot });
         assert_layout!(
             &PLANAR.concat(),
             "Level",
-            Level {
-                blurs,
-                size,
-                scale,
-                rest,
-                coarser,
-                first_tile,
-                tile_count
-            }
+            Level { blurs, size, scale, rest, coarser, first_tile, tile_count }
         );
-        assert_layout!(
-            &DIRECT.concat(),
-            "Step",
-            Step {
-                variances,
-                level,
-                slot
-            }
-        );
+        assert_layout!(&DIRECT.concat(), "Step", Step { variances, level, slot });
         let (_, draw) = crate::wgsl::layout(&LIST_TILES.concat(), "Draw");
         assert_eq!(draw as u64, DRAW_BYTES);
     }

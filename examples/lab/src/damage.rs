@@ -9,10 +9,7 @@ use serde_json::{Value, json};
 /// So many inputs, the same ones on every run, unless the environment asks for others.
 pub fn config(cases: u32) -> ProptestConfig {
     let asked = |name: &str| std::env::var_os(name).is_some();
-    let mut config = ProptestConfig {
-        failure_persistence: None,
-        ..ProptestConfig::default()
-    };
+    let mut config = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
     if !asked("PROPTEST_CASES") {
         config.cases = cases;
     }
@@ -90,9 +87,7 @@ impl Lie {
             Self::Swap(from, to) => (place(to), json.pointer(place(from)).cloned()),
             Self::Leave(at) => (place(at), None),
         };
-        let parent_and_key = at
-            .rsplit_once('/')
-            .and_then(|(p, key)| Some((json.pointer_mut(p)?, key)));
+        let parent_and_key = at.rsplit_once('/').and_then(|(p, key)| Some((json.pointer_mut(p)?, key)));
         match (parent_and_key, value) {
             (Some((Value::Object(map), key)), Some(value)) => drop(map.insert(key.into(), value)),
             (Some((Value::Object(map), key)), None) => drop(map.remove(key)),
@@ -115,10 +110,7 @@ fn places(json: &Value, at: &str, all: &mut Vec<String>) {
     };
     match json {
         Value::Object(map) => map.iter().for_each(|(key, value)| visit(key, value)),
-        Value::Array(list) => list
-            .iter()
-            .enumerate()
-            .for_each(|(i, value)| visit(&i, value)),
+        Value::Array(list) => list.iter().enumerate().for_each(|(i, value)| visit(&i, value)),
         _ => (),
     }
 }
@@ -133,9 +125,7 @@ impl Arbitrary for Lie {
 
     fn arbitrary_with((): ()) -> Self::Strategy {
         let place = any::<Index>;
-        let odd = ODD
-            .split_whitespace()
-            .map(|text| serde_json::from_str(text).expect("JSON"));
+        let odd = ODD.split_whitespace().map(|text| serde_json::from_str(text).expect("JSON"));
         let say = |(at, value)| Self::Say(at, value);
         prop_oneof![
             6 => (place(), select(odd.collect::<Vec<Value>>())).prop_map(say),

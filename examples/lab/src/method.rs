@@ -62,10 +62,7 @@ impl Ours {
     /// # Errors
     /// A format or a device that the effect refuses.
     pub fn new(device: &Device, output: TextureFormat, plan: &Plan) -> Result<Self, Error> {
-        Ok(Self {
-            effect: ScreenSpace::new(device, output, plan)?,
-            view: View::new(),
-        })
+        Ok(Self { effect: ScreenSpace::new(device, output, plan)?, view: View::new() })
     }
 }
 

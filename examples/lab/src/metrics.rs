@@ -46,15 +46,11 @@ pub fn max_error(a: &Layer, reference: &Layer, mask: &[bool]) -> Option<f64> {
 /// Drops the masked pixels that lie within `pixels` of an unmasked one, diagonals counting as one
 /// step (Chebyshev distance). What lies beyond the picture's border does not count as unmasked.
 pub fn erode(mask: &[bool], width: u32, height: u32, pixels: u32) -> Vec<bool> {
-    let window = |at: u32, end: u32| {
-        at.saturating_sub(pixels)..at.saturating_add(pixels).saturating_add(1).min(end)
-    };
+    let window =
+        |at: u32, end: u32| at.saturating_sub(pixels)..at.saturating_add(pixels).saturating_add(1).min(end);
     let is_skin = |x: u32, y: u32| mask[y as usize * width as usize + x as usize];
     let is_inner = |x, y| window(y, height).all(|v| window(x, width).all(|u| is_skin(u, v)));
-    (0..height)
-        .flat_map(|y| (0..width).map(move |x| (x, y)))
-        .map(|(x, y)| is_inner(x, y))
-        .collect()
+    (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| is_inner(x, y)).collect()
 }
 
 /// CIE L\*a\*b\* of a linear RGB colour with sRGB primaries, relative to the D65 white (1, 1, 1).
@@ -69,11 +65,7 @@ pub fn lab(linear_srgb: [f32; 3]) -> [f64; 3] {
     let [x, y, z] = TO_XYZ.map(|row| {
         let t = row.dot(rgb) / row.element_sum();
         let delta: f64 = 6.0 / 29.0;
-        if t > delta.powi(3) {
-            t.cbrt()
-        } else {
-            t / (3.0 * delta * delta) + 4.0 / 29.0
-        }
+        if t > delta.powi(3) { t.cbrt() } else { t / (3.0 * delta * delta) + 4.0 / 29.0 }
     });
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
@@ -130,12 +122,7 @@ pub fn delta_e2000(lab1: [f64; 3], lab2: [f64; 3]) -> f64 {
 
 /// The CIEDE2000 difference that `fraction` (0 to 1) of the masked pixels stay within, by nearest
 /// rank: the smallest difference with at least that share at or below it.
-pub fn delta_e2000_percentile(
-    a: &Layer,
-    reference: &Layer,
-    mask: &[bool],
-    fraction: f64,
-) -> Option<f64> {
+pub fn delta_e2000_percentile(a: &Layer, reference: &Layer, mask: &[bool], fraction: f64) -> Option<f64> {
     let mut differences: Vec<f64> = masked(a, reference, mask)
         .map(|(a, r)| delta_e2000(lab(a.as_vec3().to_array()), lab(r.as_vec3().to_array())))
         .collect();
@@ -164,9 +151,7 @@ pub fn flip_mean(
         .iter()
         .zip(mask)
         .filter(|(_, masked)| **masked)
-        .fold((0.0, 0), |(sum, count), (&error, _)| {
-            (sum + f64::from(error), count + 1)
-        });
+        .fold((0.0, 0), |(sum, count), (&error, _)| (sum + f64::from(error), count + 1));
 
     let colours = errors.apply_color_lut(&nv_flip::magma_lut()).to_vec();
     let heat = RgbImage::from_raw(test_srgb.width(), test_srgb.height(), colours)
@@ -183,10 +168,7 @@ pub fn difference(a: &Layer, b: &Layer, gain: f32) -> RgbImage {
         let i = y as usize * a.width as usize + x as usize;
         let amplified = (Vec3::from(a.pixels[i]) - Vec3::from(b.pixels[i])).abs() * gain;
         // A float-to-byte cast saturates.
-        Rgb((amplified * 255.0)
-            .round()
-            .to_array()
-            .map(|byte| byte as u8))
+        Rgb((amplified * 255.0).round().to_array().map(|byte| byte as u8))
     })
 }
 
@@ -198,9 +180,7 @@ fn masked<'a>(
 ) -> impl Iterator<Item = (DVec3, DVec3)> + 'a {
     let wide = |pixel: &[f32; 3]| Vec3::from(*pixel).as_dvec3();
     let pairs = a.pixels.iter().zip(&reference.pixels).zip(mask);
-    pairs
-        .filter(|(_, masked)| **masked)
-        .map(move |((a, r), _)| (wide(a), wide(r)))
+    pairs.filter(|(_, masked)| **masked).map(move |((a, r), _)| (wide(a), wide(r)))
 }
 
 fn finite(value: f64) -> Option<f64> {
@@ -212,11 +192,7 @@ mod tests {
     use super::*;
 
     fn row(pixels: &[[f32; 3]]) -> Layer {
-        Layer {
-            width: pixels.len() as u32,
-            height: 1,
-            pixels: pixels.to_vec(),
-        }
+        Layer { width: pixels.len() as u32, height: 1, pixels: pixels.to_vec() }
     }
 
     fn greys(values: &[f32]) -> Layer {
@@ -256,10 +232,7 @@ mod tests {
         assert_eq!(relative_rmse(&a, &a, &mask), None);
         assert_eq!(max_error(&a, &a, &mask), None);
         assert_eq!(delta_e2000_percentile(&a, &a, &mask, 0.99), None);
-        assert_eq!(
-            flip_mean(&RgbImage::new(2, 1), &RgbImage::new(2, 1), &mask).0,
-            None
-        );
+        assert_eq!(flip_mean(&RgbImage::new(2, 1), &RgbImage::new(2, 1), &mask).0, None);
     }
 
     #[test]
@@ -269,10 +242,7 @@ mod tests {
             let a = greys(&[0.5, bad, 0.6]);
             assert_eq!(relative_rmse(&a, &reference, &[true; 3]), None);
             assert_eq!(max_error(&a, &reference, &[true; 3]), None);
-            assert_eq!(
-                delta_e2000_percentile(&a, &reference, &[true; 3], 0.5),
-                None
-            );
+            assert_eq!(delta_e2000_percentile(&a, &reference, &[true; 3], 0.5), None);
         }
     }
 
@@ -294,11 +264,7 @@ mod tests {
     fn flip_tells_black_from_white_and_one_side_from_the_other() {
         let black = RgbImage::new(64, 64);
         let half = RgbImage::from_fn(64, 64, |x, _| Rgb([if x < 32 { 255 } else { 0 }; 3]));
-        let side = |left: bool| {
-            (0..64 * 64)
-                .map(|i| (i % 64 < 24) == left)
-                .collect::<Vec<_>>()
-        };
+        let side = |left: bool| (0..64 * 64).map(|i| (i % 64 < 24) == left).collect::<Vec<_>>();
         let changed = flip_mean(&half, &black, &side(true)).0.unwrap();
         let (all, heat) = flip_mean(&half, &black, &[true; 64 * 64]);
         assert!(changed > 0.9, "{changed}");
@@ -384,16 +350,8 @@ mod tests {
         for (i, (lab1, lab2, expected)) in SHARMA.into_iter().enumerate() {
             // The table is printed to four digits.
             let delta = delta_e2000(lab1, lab2);
-            assert!(
-                (delta - expected).abs() < 1e-4,
-                "pair {}: {delta}, not {expected}",
-                i + 1
-            );
-            assert!(
-                (delta_e2000(lab2, lab1) - expected).abs() < 1e-4,
-                "pair {} reversed",
-                i + 1
-            );
+            assert!((delta - expected).abs() < 1e-4, "pair {}: {delta}, not {expected}", i + 1);
+            assert!((delta_e2000(lab2, lab1) - expected).abs() < 1e-4, "pair {} reversed", i + 1);
             assert_eq!(delta_e2000(lab1, lab1), 0.0);
         }
     }

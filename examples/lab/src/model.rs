@@ -61,7 +61,8 @@ impl Default for Model {
             &picture,
         ]
         .concat();
-        let view = |part: Range<usize>| json!({"buffer": 0, "byteOffset": part.start, "byteLength": part.len()});
+        let view =
+            |part: Range<usize>| json!({"buffer": 0, "byteOffset": part.start, "byteLength": part.len()});
         let floats = |view: usize, shape: &str| json!({"bufferView": view, "componentType": 5126, "type": shape, "count": 4});
         let mut json = json!({
             "asset": {"version": "2.0"},
@@ -127,9 +128,7 @@ pub fn glb(json: &[u8], bytes: &[u8]) -> Vec<u8> {
 pub fn picture(format: ImageFormat) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     let picture = RgbImage::from_fn(2, 2, |x, y| image::Rgb([128, 100 * x as u8, 100 * y as u8]));
-    picture
-        .write_to(&mut bytes, format)
-        .expect("a picture fits in memory");
+    picture.write_to(&mut bytes, format).expect("a picture fits in memory");
     bytes.into_inner()
 }
 
@@ -143,26 +142,17 @@ pub fn flaw_of_scene(scene: &Scene) -> Option<String> {
     let material = scene.materials.iter().find(|m| {
         let textures = [m.base_color_texture, m.normal_texture];
         textures.iter().flatten().any(|t| *t >= scene.images.len())
-            || !m
-                .base_color
-                .iter()
-                .chain([&m.roughness, &m.alpha_cutoff])
-                .all(unit)
+            || !m.base_color.iter().chain([&m.roughness, &m.alpha_cutoff]).all(unit)
             || !m.normal_scale.is_finite()
     });
     let primitive = scene.primitives.iter().find_map(|p| {
         let has_material = p.material < scene.materials.len();
-        let flaw = if has_material {
-            flaw_of_primitive(p)
-        } else {
-            Some("no material".into())
-        };
+        let flaw = if has_material { flaw_of_primitive(p) } else { Some("no material".into()) };
         flaw.map(|flaw| format!("{}: {flaw}", p.name))
     });
     let nothing = scene.primitives.is_empty().then(|| "no primitives".into());
     nothing
-        .or(image
-            .map(|image| format!("{}x{} pixels that are not there", image.width, image.height)))
+        .or(image.map(|image| format!("{}x{} pixels that are not there", image.width, image.height)))
         .or(material.map(|m| format!("{m:?}")))
         .or(primitive)
 }
@@ -171,9 +161,7 @@ fn flaw_of_primitive(p: &Primitive) -> Option<String> {
     let is_unit = |v: &[f32]| (v.iter().map(|x| x * x).sum::<f32>().sqrt() - 1.0).abs() < 1e-3;
     let inside = |v: &[f32]| v.iter().all(|x| (0.0..=1.0).contains(x));
     let vertex = p.vertices.iter().find(|v| {
-        let finite = bytemuck::cast_slice::<_, f32>(std::slice::from_ref(*v))
-            .iter()
-            .all(|x| x.is_finite());
+        let finite = bytemuck::cast_slice::<_, f32>(std::slice::from_ref(*v)).iter().all(|x| x.is_finite());
         let directed = is_unit(&v.normal) && is_unit(&v.tangent[..3]) && v.tangent[3].abs() == 1.0;
         !finite || !directed || !inside(&v.atlas_uv) || !inside(&v.mask)
     });
@@ -181,15 +169,8 @@ fn flaw_of_primitive(p: &Primitive) -> Option<String> {
     let count = p.indices.is_empty() || !p.indices.len().is_multiple_of(3);
     // Pages follow on each other and hold all indices, if there are any.
     let ends = [0].into_iter().chain(p.pages.iter().map(|page| page.end));
-    let apart = p
-        .pages
-        .iter()
-        .zip(ends)
-        .any(|(page, end)| page.start != end || page.is_empty());
-    let short = p
-        .pages
-        .last()
-        .is_some_and(|page| page.end as usize != p.indices.len());
+    let apart = p.pages.iter().zip(ends).any(|(page, end)| page.start != end || page.is_empty());
+    let short = p.pages.last().is_some_and(|page| page.end as usize != p.indices.len());
     vertex
         .map(|v| format!("{v:?}"))
         .or(index.map(|i| format!("index {i} of {} vertices", p.vertices.len())))
@@ -200,9 +181,7 @@ fn flaw_of_primitive(p: &Primitive) -> Option<String> {
 /// What of a profile is not as its documentation says.
 pub fn flaw_of_profile(profile: &Profile) -> Option<String> {
     let gaussians = profile.gaussians();
-    let numbers = gaussians
-        .iter()
-        .flat_map(|g| g.weight.into_iter().chain([g.variance_mm2]));
+    let numbers = gaussians.iter().flat_map(|g| g.weight.into_iter().chain([g.variance_mm2]));
     let fits = !gaussians.is_empty() && numbers.into_iter().all(|x| x.is_finite() && x >= 0.0);
     let sum: Vec3 = gaussians.iter().map(|g| Vec3::from(g.weight)).sum();
     let whole = (sum - 1.0).abs().max_element() < 1e-5;

@@ -15,8 +15,7 @@ use image::{ImageResult, RgbImage};
 pub fn png(picture: &RgbImage) -> ImageResult<Vec<u8>> {
     let mut file = Vec::new();
     // The encoder's default is made for speed; the report carries a dozen of these.
-    let encoder =
-        PngEncoder::new_with_quality(&mut file, CompressionType::Default, FilterType::Adaptive);
+    let encoder = PngEncoder::new_with_quality(&mut file, CompressionType::Default, FilterType::Adaptive);
     picture.write_with_encoder(encoder)?;
     Ok(file)
 }
@@ -73,9 +72,7 @@ mod tests {
     #[test]
     fn pictures_survive_their_files() {
         let picture = RgbImage::from_fn(5, 4, |x, y| image::Rgb([x as u8, y as u8, 200]));
-        let read = image::load_from_memory(&png(&picture).unwrap())
-            .unwrap()
-            .into_rgb8();
+        let read = image::load_from_memory(&png(&picture).unwrap()).unwrap().into_rgb8();
         assert_eq!(read, picture);
     }
 
@@ -91,9 +88,8 @@ mod tests {
 
         fn names(&self) -> Vec<String> {
             let entries = fs::read_dir(&self.0).unwrap();
-            let mut names: Vec<_> = entries
-                .map(|e| e.unwrap().file_name().into_string().unwrap())
-                .collect();
+            let mut names: Vec<_> =
+                entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
             names.sort();
             names
         }
@@ -106,10 +102,7 @@ mod tests {
     }
 
     fn files(names: &[&str]) -> Vec<(String, Vec<u8>)> {
-        names
-            .iter()
-            .map(|&name| (name.to_string(), b"new".to_vec()))
-            .collect()
+        names.iter().map(|&name| (name.to_string(), b"new".to_vec())).collect()
     }
 
     #[test]

@@ -4,22 +4,14 @@ use image::{Rgb, RgbImage};
 
 /// The byte that shows linear light; brighter than white is white.
 pub fn encode(light: f32) -> u8 {
-    let encoded = if light <= 0.0031308 {
-        12.92 * light
-    } else {
-        1.055 * light.powf(1.0 / 2.4) - 0.055
-    };
+    let encoded = if light <= 0.0031308 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 };
     // A float-to-byte cast saturates.
     (255.0 * encoded).round() as u8
 }
 
 fn decode(byte: u8) -> f32 {
     let encoded = f32::from(byte) / 255.0;
-    if encoded <= 0.04045 {
-        encoded / 12.92
-    } else {
-        ((encoded + 0.055) / 1.055).powf(2.4)
-    }
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }
 
 /// Half as wide and high, each pixel the mean light of four.

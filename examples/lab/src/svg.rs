@@ -41,11 +41,7 @@ pub struct Type<'a> {
 
 impl<'a> Stroke<'a> {
     pub const fn new(color: &'a str, width: f64) -> Self {
-        Self {
-            color,
-            width,
-            dashes: "",
-        }
+        Self { color, width, dashes: "" }
     }
 
     pub fn dashed(self, dashes: &'a str) -> Self {
@@ -55,13 +51,7 @@ impl<'a> Stroke<'a> {
 
 impl<'a> Type<'a> {
     pub const fn new(color: &'a str, size: f64) -> Self {
-        Self {
-            size,
-            color,
-            anchor: "start",
-            upwards: false,
-            code: false,
-        }
+        Self { size, color, anchor: "start", upwards: false, code: false }
     }
 
     pub fn anchored(self, anchor: &'a str) -> Self {
@@ -92,11 +82,7 @@ pub struct Svg {
 impl Svg {
     /// A line through points.
     pub fn line(&mut self, points: &[Point], stroke: Stroke) {
-        let Stroke {
-            color,
-            width,
-            dashes,
-        } = stroke;
+        let Stroke { color, width, dashes } = stroke;
         let dashes = match dashes {
             "" => String::new(),
             dashes => format!(" stroke-dasharray=\"{dashes}\""),
@@ -113,23 +99,10 @@ impl Svg {
         if text.is_empty() {
             return;
         }
-        let Type {
-            size,
-            color,
-            anchor,
-            upwards,
-            code,
-        } = set;
-        let turn = if upwards {
-            format!(" transform=\"rotate(-90 {x:.1} {y:.1})\"")
-        } else {
-            String::new()
-        };
-        let family = if code {
-            " font-family=\"Hack, monospace\""
-        } else {
-            ""
-        };
+        let Type { size, color, anchor, upwards, code } = set;
+        let turn =
+            if upwards { format!(" transform=\"rotate(-90 {x:.1} {y:.1})\"") } else { String::new() };
+        let family = if code { " font-family=\"Hack, monospace\"" } else { "" };
         let text = escape(text);
         self.add(format_args!(
             "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{size}\" fill=\"{color}\" \
@@ -165,9 +138,7 @@ impl Svg {
         };
         let shape = match marker {
             Marker::Circle => {
-                return self.add(format_args!(
-                    "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" {look}/>"
-                ));
+                return self.add(format_args!("<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" {look}/>"));
             }
             Marker::Square => around(4, 5.0, 0.125),
             Marker::Diamond => around(4, 5.2, 0.0),
@@ -226,9 +197,7 @@ impl Rasteriser {
         fonts.load_font_data(HACK_REGULAR.to_vec());
         fonts.set_sans_serif_family("Ubuntu");
         fonts.set_monospace_family("Hack");
-        Self {
-            fonts: Arc::new(fonts),
-        }
+        Self { fonts: Arc::new(fonts) }
     }
 
     /// The picture of a drawing, on white.
@@ -236,16 +205,9 @@ impl Rasteriser {
     /// # Errors
     /// A text that is not SVG, or that has no size.
     pub fn picture(&self, svg: &str) -> Result<RgbImage, Box<dyn Error>> {
-        let options = Options {
-            fontdb: self.fonts.clone(),
-            ..Options::default()
-        };
+        let options = Options { fontdb: self.fonts.clone(), ..Options::default() };
         let tree = Tree::from_str(svg, &options)?;
-        let size = tree
-            .size()
-            .to_int_size()
-            .scale_by(DENSITY)
-            .ok_or("no size")?;
+        let size = tree.size().to_int_size().scale_by(DENSITY).ok_or("no size")?;
         let mut pixmap = Pixmap::new(size.width(), size.height()).ok_or("no size")?;
         pixmap.fill(Color::WHITE);
         let zoom = Transform::from_scale(DENSITY, DENSITY);
@@ -294,9 +256,7 @@ mod tests {
     #[test]
     fn every_marker_is_seen() {
         use Marker::*;
-        let shapes = [
-            Circle, Square, Diamond, Up, Down, Plus, Cross, Star, Pentagon,
-        ];
+        let shapes = [Circle, Square, Diamond, Up, Down, Plus, Cross, Star, Pentagon];
         for marker in shapes {
             for is_hollow in [false, true] {
                 let mut svg = Svg::default();

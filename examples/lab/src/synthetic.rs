@@ -24,11 +24,7 @@ pub fn ours(plan: &Plan, format: TextureFormat) -> Ours {
 }
 
 pub fn single_gaussian(variance_mm2: f32) -> Profile {
-    Profile::new(&[subsurface::Gaussian {
-        variance_mm2,
-        weight: [1.0; 3],
-    }])
-    .unwrap()
+    Profile::new(&[subsurface::Gaussian { variance_mm2, weight: [1.0; 3] }]).unwrap()
 }
 
 /// A point of a surface seen by a pixel, in view space and mm.
@@ -111,10 +107,7 @@ impl View {
                         let (o, d) = self.ray(at + DVec2::new(dx, dy));
                         o + d * ((h.point - o).dot(h.normal) / d.dot(h.normal))
                     };
-                    [
-                        on_plane(0.5, 0.0) - on_plane(-0.5, 0.0),
-                        on_plane(0.0, 0.5) - on_plane(0.0, -0.5),
-                    ]
+                    [on_plane(0.5, 0.0) - on_plane(-0.5, 0.0), on_plane(0.0, 0.5) - on_plane(0.0, -0.5)]
                 }));
                 pixels_mm2.push(found.map_or(0.0, |h| {
                     let facing = |dx: f64, dy: f64| {
@@ -128,12 +121,7 @@ impl View {
                 hits.push(found);
             }
         }
-        GBuffer {
-            view: *self,
-            hits,
-            steps,
-            pixels_mm2,
-        }
+        GBuffer { view: *self, hits, steps, pixels_mm2 }
     }
 }
 
@@ -235,11 +223,7 @@ impl GBuffer {
 
     /// Pixels for which `select` holds, with what they see.
     pub fn pixels(&self, select: impl Fn(&Hit) -> bool) -> Vec<(usize, Hit)> {
-        self.hits
-            .iter()
-            .enumerate()
-            .filter_map(|(i, h)| h.filter(&select).map(|h| (i, h)))
-            .collect()
+        self.hits.iter().enumerate().filter_map(|(i, h)| h.filter(&select).map(|h| (i, h))).collect()
     }
 }
 
@@ -252,12 +236,7 @@ pub fn plane(
     move |origin, ray| {
         let anchor = DVec3::new(0.0, 0.0, -distance_mm);
         let point = origin + ray * ((anchor - origin).dot(normal) / ray.dot(normal));
-        (point.z < -1.0).then(|| Hit {
-            point,
-            normal,
-            irradiance: irradiance(point - anchor),
-            id: 1,
-        })
+        (point.z < -1.0).then(|| Hit { point, normal, irradiance: irradiance(point - anchor), id: 1 })
     }
 }
 
@@ -274,12 +253,7 @@ pub fn sphere(
         let disc = b * b - o.length_squared() + rho_mm * rho_mm;
         (disc >= 0.0).then(|| {
             let normal = (o + d * (-b - disc.sqrt())) / rho_mm;
-            Hit {
-                point: center + normal * rho_mm,
-                normal,
-                irradiance: irradiance(normal),
-                id: 1,
-            }
+            Hit { point: center + normal * rho_mm, normal, irradiance: irradiance(normal), id: 1 }
         })
     }
 }

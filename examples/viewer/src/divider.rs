@@ -35,10 +35,7 @@ pub fn join(left: &RgbImage, right: &RgbImage, fraction: f32) -> RgbImage {
 mod tests {
     use super::*;
 
-    const PICTURE: Rect = Rect {
-        min: Pos2::new(300.0, 10.0),
-        max: Pos2::new(700.0, 210.0),
-    };
+    const PICTURE: Rect = Rect { min: Pos2::new(300.0, 10.0), max: Pos2::new(700.0, 210.0) };
 
     #[test]
     fn the_divider_stays_in_the_picture() {
@@ -54,10 +51,7 @@ mod tests {
         for at in [0.0, 0.25, 1.0] {
             let [(left, left_uv), (right, right_uv)] = halves(PICTURE, at);
             assert_eq!((left.min, right.max), (PICTURE.min, PICTURE.max));
-            assert_eq!(
-                (left.right(), left_uv.right()),
-                (right.left(), right_uv.left())
-            );
+            assert_eq!((left.right(), left_uv.right()), (right.left(), right_uv.left()));
             assert_eq!((left_uv.right(), left_uv.height()), (at, 1.0));
             assert_eq!(fraction(left.right(), PICTURE), at);
         }

@@ -18,14 +18,8 @@ pub enum Layer {
 }
 
 impl Layer {
-    pub const ALL: [Self; 6] = [
-        Self::None,
-        Self::Texture,
-        Self::Screen,
-        Self::Exact,
-        Self::Width,
-        Self::Level,
-    ];
+    pub const ALL: [Self; 6] =
+        [Self::None, Self::Texture, Self::Screen, Self::Exact, Self::Width, Self::Level];
 
     pub fn title(self) -> &'static str {
         match self {

@@ -19,13 +19,7 @@ const BAR: f32 = 12.0;
 const LINE: f32 = 18.0;
 
 /// Draws a legend from a lower left corner upwards.
-pub fn show(
-    painter: &Painter,
-    corner: Pos2,
-    legend: &Legend,
-    profile: &Profile,
-    half_resolution: bool,
-) {
+pub fn show(painter: &Painter, corner: Pos2, legend: &Legend, profile: &Profile, half_resolution: bool) {
     let at = |x: f32, up: f32| corner + Vec2::new(x, -up);
     match legend {
         Legend::Width(range) => {
@@ -49,12 +43,7 @@ pub fn show(
         Legend::Levels(keys) => {
             for (i, key) in keys.iter().enumerate() {
                 let up = 20.0 + LINE * i as f32;
-                bar(
-                    painter,
-                    at(0.0, up + BAR + 1.0),
-                    60.0,
-                    key.colors.iter().copied(),
-                );
+                bar(painter, at(0.0, up + BAR + 1.0), 60.0, key.colors.iter().copied());
                 let [first, last] = key.px_per_mm;
                 let rows = match key.colors.len() {
                     1 => format!("row of {first:.2} px/mm"),
@@ -64,13 +53,7 @@ pub fn show(
                     0 => format!("the frame alone: {rows}"),
                     level => format!("level {level}: {rows}"),
                 };
-                label(
-                    painter,
-                    at(66.0, up - 3.0),
-                    Align2::LEFT_BOTTOM,
-                    &text,
-                    WIDTH,
-                );
+                label(painter, at(66.0, up - 3.0), Align2::LEFT_BOTTOM, &text, WIDTH);
             }
             let text = "coarsest level that a tile of 8×8 is blurred at, by row of the plan";
             let up = 20.0 + LINE * keys.len() as f32;
@@ -89,12 +72,7 @@ pub fn label(painter: &Painter, at: Pos2, anchor: Align2, text: &str, wrap: f32)
 }
 
 /// Colours in a row.
-fn bar(
-    painter: &Painter,
-    corner: Pos2,
-    width: f32,
-    colors: impl ExactSizeIterator<Item = [u8; 3]>,
-) {
+fn bar(painter: &Painter, corner: Pos2, width: f32, colors: impl ExactSizeIterator<Item = [u8; 3]>) {
     let step = width / colors.len() as f32;
     for (i, [r, g, b]) in colors.enumerate() {
         let corner = corner + Vec2::new(i as f32 * step, 0.0);

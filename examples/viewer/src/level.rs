@@ -49,11 +49,7 @@ pub fn picture(plan: &Plan, rows: &[Option<usize>]) -> (Vec<[u8; 3]>, Vec<Key>) 
                 key.px_per_mm[1] = row.px_per_mm;
                 key.colors.push(color(i));
             }
-            _ => keys.push(Key {
-                level: row.level,
-                px_per_mm: [row.px_per_mm; 2],
-                colors: vec![color(i)],
-            }),
+            _ => keys.push(Key { level: row.level, px_per_mm: [row.px_per_mm; 2], colors: vec![color(i)] }),
         }
     }
     (pixels.collect(), keys)
@@ -94,10 +90,7 @@ mod tests {
         assert_eq!(keys, expected);
         assert!(keys[0].level < keys[1].level);
         let seen = [0, 1, 10].map(|i| pixels[i]);
-        assert_eq!(
-            seen,
-            [width::NOT_SKIN, keys[0].colors[0], keys[1].colors[0]]
-        );
+        assert_eq!(seen, [width::NOT_SKIN, keys[0].colors[0], keys[1].colors[0]]);
     }
 
     #[test]

@@ -58,24 +58,14 @@ enum Answer {
 fn view(options: Options) -> Result<(), Error> {
     let (name, scene) = match &options.model {
         Some(path) => (path.display().to_string(), Scene::load(path)?),
-        None => (
-            "built-in head".to_owned(),
-            Scene::from_glb(subsurface_lab::HEAD)?,
-        ),
+        None => ("built-in head".to_owned(), Scene::from_glb(subsurface_lab::HEAD)?),
     };
     let gpu = Gpu::with(Features::TIMESTAMP_QUERY)?;
-    let event_loop = EventLoop::with_user_event()
-        .build()
-        .map_err(|e| window::no_window(&e))?;
+    let event_loop = EventLoop::with_user_event().build().map_err(|e| window::no_window(&e))?;
 
     let orbit = Camera::framing(&scene, View::Front, options.size).into();
     let about = format!("{name}, {} mm a unit\n{}", options.mm_per_unit, gpu.adapter);
-    let stage = Stage {
-        gpu,
-        scene,
-        mm_per_unit: options.mm_per_unit,
-        texture_size: options.texture_size,
-    };
+    let stage = Stage { gpu, scene, mm_per_unit: options.mm_per_unit, texture_size: options.texture_size };
     // An answer that comes after the window has gone is of no use.
     let proxy = event_loop.create_proxy();
     let planner = Planner::new(move |fitted| {
@@ -95,9 +85,7 @@ fn view(options: Options) -> Result<(), Error> {
         window: None,
         result: Ok(()),
     };
-    event_loop
-        .run_app(&mut app)
-        .map_err(|e| window::no_window(&e))?;
+    event_loop.run_app(&mut app).map_err(|e| window::no_window(&e))?;
     app.result
 }
 
@@ -129,9 +117,7 @@ impl App {
             }
             // Beyond what a clock holds is never.
             Ok(delay) => event_loop.set_control_flow(
-                Instant::now()
-                    .checked_add(delay)
-                    .map_or(ControlFlow::Wait, ControlFlow::WaitUntil),
+                Instant::now().checked_add(delay).map_or(ControlFlow::Wait, ControlFlow::WaitUntil),
             ),
             Err(error) => {
                 self.result = Err(error);

@@ -76,11 +76,7 @@ pub fn turn_light(light: Vec3, right: f32, down: f32) -> Vec3 {
 }
 
 fn direction(yaw: f32, pitch: f32) -> Vec3 {
-    Vec3::new(
-        yaw.sin() * pitch.cos(),
-        pitch.sin(),
-        yaw.cos() * pitch.cos(),
-    )
+    Vec3::new(yaw.sin() * pitch.cos(), pitch.sin(), yaw.cos() * pitch.cos())
 }
 
 /// Length, yaw and pitch.
@@ -94,11 +90,8 @@ fn angles(v: Vec3) -> (f32, f32, f32) {
 mod tests {
     use super::*;
 
-    const CAMERA: Camera = Camera {
-        eye: Vec3::new(1.0, 2.5, 4.0),
-        target: Vec3::new(0.5, 1.5, -0.5),
-        fov_y: 0.4,
-    };
+    const CAMERA: Camera =
+        Camera { eye: Vec3::new(1.0, 2.5, 4.0), target: Vec3::new(0.5, 1.5, -0.5), fov_y: 0.4 };
 
     #[test]
     fn a_camera_stays_where_it_was() {
@@ -131,10 +124,7 @@ mod tests {
             turned.turn(right, down);
             shifted.shift(right, down);
             let moved = across(&turned.camera(), front) - across(&CAMERA, front);
-            assert!(
-                moved.x * right >= -1e-6 && moved.y * down <= 1e-6,
-                "{moved}"
-            );
+            assert!(moved.x * right >= -1e-6 && moved.y * down <= 1e-6, "{moved}");
             // A point at the target's depth moves by just the share of the picture that was asked for.
             let height = 2.0 * orbit.distance * (orbit.fov_y / 2.0).tan();
             let moved = across(&shifted.camera(), CAMERA.target) / height;

@@ -33,13 +33,11 @@ fn modes(ui: &mut Ui, viewer: &mut Viewer) {
     }
     if controls.mode == Mode::Split {
         for (i, side) in ["left", "right"].into_iter().enumerate() {
-            ComboBox::from_label(side)
-                .selected_text(controls.pair[i].title())
-                .show_ui(ui, |ui| {
-                    for layer in Layer::ALL {
-                        ui.selectable_value(&mut controls.pair[i], layer, layer.title());
-                    }
-                });
+            ComboBox::from_label(side).selected_text(controls.pair[i].title()).show_ui(ui, |ui| {
+                for layer in Layer::ALL {
+                    ui.selectable_value(&mut controls.pair[i], layer, layer.title());
+                }
+            });
         }
     }
     ui.checkbox(&mut controls.half_resolution, "half resolution (H)");
@@ -124,9 +122,7 @@ fn times(ui: &mut Ui, viewer: &mut Viewer) {
             }
         });
     }
-    ui.small(
-        "Of the irradiance over skin, less a rim of two pixels. Texture space if it was shown.",
-    );
+    ui.small("Of the irradiance over skin, less a rim of two pixels. Texture space if it was shown.");
     let measure = ui.add_enabled(!viewer.is_waiting(), Button::new("measure this view (M)"));
     viewer.measure |= measure.clicked();
 }

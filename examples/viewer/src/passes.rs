@@ -17,10 +17,7 @@ pub struct Pass {
 pub fn run(
     gpu: &Gpu,
     times: Option<(&Timestamps, &mut Vec<Pass>)>,
-    record: impl FnOnce(
-        &mut CommandEncoder,
-        Option<&QuerySet>,
-    ) -> Result<Vec<String>, subsurface::Error>,
+    record: impl FnOnce(&mut CommandEncoder, Option<&QuerySet>) -> Result<Vec<String>, subsurface::Error>,
 ) -> Result<(), Error> {
     let Some((timestamps, passes)) = times else {
         gpu.run(|encoder| record(encoder, None))?;
@@ -48,10 +45,7 @@ fn add(passes: &mut Vec<Pass>, label: &str, ms: f64) {
     let name = label.split_once(' ').map_or(label, |(_, name)| name);
     match passes.iter_mut().find(|pass| pass.name == name) {
         Some(pass) => pass.ms += ms,
-        None => passes.push(Pass {
-            name: name.to_owned(),
-            ms,
-        }),
+        None => passes.push(Pass { name: name.to_owned(), ms }),
     }
 }
 
@@ -63,17 +57,10 @@ mod tests {
     #[test]
     fn passes_of_a_name_are_added_up() {
         let mut passes = Vec::new();
-        for (label, ms) in [
-            ("effect one", 1.0),
-            ("effect two", 2.0),
-            ("effect one", 4.0),
-        ] {
+        for (label, ms) in [("effect one", 1.0), ("effect two", 2.0), ("effect one", 4.0)] {
             add(&mut passes, label, ms);
         }
-        let expected = [("one", 5.0), ("two", 2.0)].map(|(name, ms)| Pass {
-            name: name.into(),
-            ms,
-        });
+        let expected = [("one", 5.0), ("two", 2.0)].map(|(name, ms)| Pass { name: name.into(), ms });
         assert_eq!(passes, expected);
     }
 
@@ -84,17 +71,13 @@ mod tests {
             return; // A device without them is not asked.
         };
         let mut passes = Vec::new();
-        run(
-            &gpu,
-            Some((&timestamps, &mut passes)),
-            |encoder, queries| {
-                assert!(queries.is_some());
-                for query in 0..4 {
-                    timestamps.mark(encoder, query);
-                }
-                Ok(vec!["effect first".into(), "effect second".into()])
-            },
-        )
+        run(&gpu, Some((&timestamps, &mut passes)), |encoder, queries| {
+            assert!(queries.is_some());
+            for query in 0..4 {
+                timestamps.mark(encoder, query);
+            }
+            Ok(vec!["effect first".into(), "effect second".into()])
+        })
         .unwrap();
         assert_eq!([&passes[0].name, &passes[1].name], ["first", "second"]);
         assert!(passes.iter().all(|pass| pass.ms >= 0.0 && pass.ms < 1000.0));

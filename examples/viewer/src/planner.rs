@@ -35,14 +35,7 @@ pub struct Planner {
 
 impl Planner {
     pub fn new(done: impl Fn(Fitted) + Send + Sync + 'static) -> Self {
-        Self {
-            done: Arc::new(done),
-            fitting: None,
-            fitted: None,
-            plan: None,
-            error: None,
-            seconds: 0.0,
-        }
+        Self { done: Arc::new(done), fitting: None, fitted: None, plan: None, error: None, seconds: 0.0 }
     }
 
     /// Starts on a plan, unless it is there or another is being fitted: ask again when that is done.
@@ -56,11 +49,7 @@ impl Planner {
             let since = Instant::now();
             let plan = Plan::new(&[wish.profile], wish.max_error).map_err(Error::from);
             let seconds = since.elapsed().as_secs_f64();
-            done(Fitted {
-                wish,
-                plan,
-                seconds,
-            });
+            done(Fitted { wish, plan, seconds });
         });
     }
 
@@ -96,10 +85,7 @@ mod tests {
             // The test may have failed and gone.
             let _ = sender.send(fitted);
         });
-        let wish = |max_error| Wish {
-            profile: Profile::SKIN,
-            max_error,
-        };
+        let wish = |max_error| Wish { profile: Profile::SKIN, max_error };
         planner.ask(wish(0.1));
         assert!(planner.is_fitting() && planner.plan.is_none());
         planner.take(fits.recv().unwrap());

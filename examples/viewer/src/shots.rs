@@ -37,10 +37,7 @@ mod tests {
     fn numbers_go_on_where_they_were() {
         let next = |names: &[&str]| super::next(names.iter().map(|n| n.to_string()));
         assert_eq!(next(&[]), "viewer-001.png");
-        assert_eq!(
-            next(&["viewer-009.png", "viewer-002.png", "viewer-x.png"]),
-            "viewer-010.png"
-        );
+        assert_eq!(next(&["viewer-009.png", "viewer-002.png", "viewer-x.png"]), "viewer-010.png");
         assert_eq!(next(&["viewer-1000.png"]), "viewer-1001.png");
     }
 }

@@ -102,10 +102,7 @@ impl Stage {
     /// Answers requests until there are no more: the newest, and none that is older.
     pub fn run(self, requests: Receiver<Request>, answer: impl Fn(Result<Frame, Error>)) {
         let mut set = None;
-        let mut effects = Effects {
-            timestamps: passes::timestamps(&self.gpu),
-            ..Default::default()
-        };
+        let mut effects = Effects { timestamps: passes::timestamps(&self.gpu), ..Default::default() };
         while let Ok(mut request) = requests.recv() {
             while let Ok(newer) = requests.try_recv() {
                 request = Request {
@@ -146,10 +143,7 @@ impl Stage {
             pictures,
             draw_ms: set.view.draw_ms,
             compose_ms: set.view.compose_ms,
-            times: Layer::ALL
-                .iter()
-                .filter_map(|layer| shots.get(layer)?.time)
-                .collect(),
+            times: Layer::ALL.iter().filter_map(|layer| shots.get(layer)?.time).collect(),
             passes: Layer::ALL
                 .iter()
                 .filter_map(|layer| Some((*layer, shots.get(layer)?.passes.clone()?)))
@@ -321,27 +315,15 @@ impl Set {
         look: &Look,
         layer: Layer,
     ) -> Result<Shot, Error> {
-        let Scattered {
-            title,
-            irradiance,
-            taken_ms,
-        } = self.run_effect(stage, effects, look, layer, None)?;
-        let time = taken_ms.map(|ms| Time {
-            layer,
-            ms,
-            is_first: effects.last_ms.insert(layer, ms).is_none(),
-        });
+        let Scattered { title, irradiance, taken_ms } =
+            self.run_effect(stage, effects, look, layer, None)?;
+        let time =
+            taken_ms.map(|ms| Time { layer, ms, is_first: effects.last_ms.insert(layer, ms).is_none() });
         let since = Instant::now();
-        let pixels = self
-            .renderer
-            .compose(&stage.gpu, &irradiance, Shown::Picture, 1.0);
+        let pixels = self.renderer.compose(&stage.gpu, &irradiance, Shown::Picture, 1.0);
         self.view.compose_ms = Some(ms(since));
         Ok(Shot {
-            picture: Arc::new(Picture {
-                title,
-                image: image(self.size, pixels)?,
-                legend: None,
-            }),
+            picture: Arc::new(Picture { title, image: image(self.size, pixels)?, legend: None }),
             irradiance: Some(irradiance),
             time,
             passes: None,
@@ -349,12 +331,7 @@ impl Set {
     }
 
     /// Runs the effects that are shown once more, and has the device time their passes.
-    fn time_passes(
-        &mut self,
-        stage: &Stage,
-        effects: &mut Effects,
-        look: &Look,
-    ) -> Result<(), Error> {
+    fn time_passes(&mut self, stage: &Stage, effects: &mut Effects, look: &Look) -> Result<(), Error> {
         for layer in look.layers.iter().filter(|layer| layer.has_passes()) {
             // None where it could not be had; and whoever was shown has compiled.
             if !self.view.shots.contains_key(layer) {
@@ -389,17 +366,10 @@ impl Set {
             (Layer::Exact, _) => Some(Plan::exact(&[look.profile])?),
             (Layer::Texture, _) => None,
             _ => {
-                return Ok(Scattered {
-                    title,
-                    irradiance: fallen.clone(),
-                    taken_ms: None,
-                });
+                return Ok(Scattered { title, irradiance: fallen.clone(), taken_ms: None });
             }
         };
-        let output = self
-            .outputs
-            .entry(layer)
-            .or_insert_with(|| renderer.scattered_target(gpu));
+        let output = self.outputs.entry(layer).or_insert_with(|| renderer.scattered_target(gpu));
         let format = output.texture().format();
         let since = Instant::now();
         match plan {
@@ -444,11 +414,7 @@ impl Set {
                 }
             }
         }
-        Ok(Scattered {
-            title,
-            irradiance: output.clone(),
-            taken_ms: Some(ms(since)),
-        })
+        Ok(Scattered { title, irradiance: output.clone(), taken_ms: Some(ms(since)) })
     }
 
     fn false_colors(&self, stage: &Stage, look: &Look, layer: Layer) -> Result<Shot, Error> {
@@ -474,11 +440,7 @@ impl Set {
             }
         };
         Ok(Shot {
-            picture: Arc::new(Picture {
-                title,
-                image: image(self.size, pixels)?,
-                legend,
-            }),
+            picture: Arc::new(Picture { title, image: image(self.size, pixels)?, legend }),
             irradiance: None,
             time: None,
             passes: None,
@@ -505,11 +467,7 @@ impl Set {
         let mut light = |layer| -> Result<metrics::Layer, Error> {
             let shot = self.shot(stage, effects, look, layer)?;
             let pixels = shot.irradiance.iter().flat_map(|v| stage.gpu.read(v));
-            Ok(metrics::Layer {
-                width,
-                height,
-                pixels: pixels.map(|[r, g, b, _]| [r, g, b]).collect(),
-            })
+            Ok(metrics::Layer { width, height, pixels: pixels.map(|[r, g, b, _]| [r, g, b]).collect() })
         };
         let exact = light(Layer::Exact)?;
         let mut errors = Vec::new();

@@ -5,8 +5,8 @@ use std::sync::mpsc::Sender;
 use std::time::Duration;
 
 use egui::{
-    Align2, Color32, ColorImage, CursorIcon, Key, MouseWheelUnit, PointerButton, Pos2, Rect,
-    Response, Sense, Stroke, TextureHandle, Ui, Vec2,
+    Align2, Color32, ColorImage, CursorIcon, Key, MouseWheelUnit, PointerButton, Pos2, Rect, Response,
+    Sense, Stroke, TextureHandle, Ui, Vec2,
 };
 use image::RgbImage;
 use subsurface::{Gaussian, Profile};
@@ -106,8 +106,7 @@ impl Viewer {
             Ok(frame) => {
                 let upload = |picture: &Picture| {
                     let size = [picture.image.width(), picture.image.height()];
-                    let image =
-                        ColorImage::from_rgb(size.map(|s| s as usize), picture.image.as_raw());
+                    let image = ColorImage::from_rgb(size.map(|s| s as usize), picture.image.as_raw());
                     context.load_texture("picture", image, egui::TextureOptions::LINEAR)
                 };
                 self.textures = frame.pictures.iter().map(|p| upload(p)).collect();
@@ -140,8 +139,7 @@ impl Viewer {
             .show(ui, |ui| panel::show(ui, self));
         let frame = egui::Frame::NONE.fill(Color32::from_gray(14));
         let picture = egui::CentralPanel::default().frame(frame).show(ui, |ui| {
-            let (rect, response) =
-                ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
+            let (rect, response) = ui.allocate_exact_size(ui.available_size(), Sense::click_and_drag());
             self.mouse(ui, &response);
             self.picture(ui, rect);
             rect
@@ -149,10 +147,7 @@ impl Viewer {
         let is_moving = ui.input(|i| i.pointer.any_down());
         let profile = scaled(self.controls.profile_scale)?;
         if !is_moving {
-            self.planner.ask(Wish {
-                profile,
-                max_error: self.controls.max_error,
-            });
+            self.planner.ask(Wish { profile, max_error: self.controls.max_error });
         }
         let pixels = picture.inner.size() * ui.pixels_per_point();
         self.request(pixels, profile, is_moving)?;
@@ -164,11 +159,7 @@ impl Viewer {
 
     /// Asks for what is to be seen, unless that was asked for already.
     fn request(&mut self, pixels: Vec2, profile: Profile, is_moving: bool) -> Result<(), Error> {
-        let divisor = if self.controls.half_resolution {
-            2.0
-        } else {
-            1.0
-        };
+        let divisor = if self.controls.half_resolution { 2.0 } else { 1.0 };
         let size = [pixels.x, pixels.y].map(|s| (s / divisor).round() as u32);
         if size.contains(&0) {
             return Ok(()); // a window that is all panel
@@ -201,15 +192,7 @@ impl Viewer {
 
     fn keys(&mut self, ui: &Ui) {
         let pressed = |key| ui.input(|i| i.key_pressed(key));
-        let digits = [
-            Key::Num1,
-            Key::Num2,
-            Key::Num3,
-            Key::Num4,
-            Key::Num5,
-            Key::Num6,
-            Key::Num7,
-        ];
+        let digits = [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7];
         for (key, mode) in digits.into_iter().zip(Mode::ALL) {
             if pressed(key) {
                 self.controls.mode = mode;
@@ -359,12 +342,8 @@ fn notches(event: &egui::Event) -> f32 {
 /// The profile of skin, `scale` times as wide.
 fn scaled(scale: f32) -> Result<Profile, subsurface::Error> {
     let gaussians = Profile::SKIN.gaussians().iter();
-    let gaussians: Vec<_> = gaussians
-        .map(|g| Gaussian {
-            variance_mm2: g.variance_mm2 * scale * scale,
-            ..*g
-        })
-        .collect();
+    let gaussians: Vec<_> =
+        gaussians.map(|g| Gaussian { variance_mm2: g.variance_mm2 * scale * scale, ..*g }).collect();
     Profile::new(&gaussians)
 }
 

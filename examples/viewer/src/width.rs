@@ -84,24 +84,14 @@ mod tests {
 
     #[test]
     fn widths_are_those_of_the_camera() {
-        let camera = Camera {
-            eye: Vec3::new(0.0, 0.0, 0.7),
-            target: Vec3::ZERO,
-            fov_y: 0.4,
-        };
+        let camera = Camera { eye: Vec3::new(0.0, 0.0, 0.7), target: Vec3::ZERO, fov_y: 0.4 };
         let size = [300, 200];
         let depth_at = |z: f32| camera.projection(size).project_point3(Vec3::Z * -z).z;
         let depth = [depth_at(0.7), depth_at(1.4), depth_at(0.7)];
         let widths = in_pixels(3.0, &depth, &[true, true, false], &camera, size, 1000.0);
         let expected = 3.0 * camera.px_per_unit(size) / 1000.0;
-        assert!(
-            (widths[0] / expected - 1.0).abs() < 1e-5,
-            "{widths:?} {expected}"
-        );
-        assert!(
-            (widths[1] / expected - 0.5).abs() < 1e-5,
-            "{widths:?} {expected}"
-        );
+        assert!((widths[0] / expected - 1.0).abs() < 1e-5, "{widths:?} {expected}");
+        assert!((widths[1] / expected - 0.5).abs() < 1e-5, "{widths:?} {expected}");
         assert_eq!(widths[2], 0.0);
     }
 
@@ -110,10 +100,7 @@ mod tests {
         for widths in [vec![0.0, 3.0, 5.1], vec![4.0], vec![0.01, 900.0]] {
             let range = range(&widths).unwrap();
             for width in widths.into_iter().filter(|w| *w > 0.0) {
-                assert!(
-                    (0.0..=1.0).contains(&place(width, range)),
-                    "{width} {range:?}"
-                );
+                assert!((0.0..=1.0).contains(&place(width, range)), "{width} {range:?}");
             }
         }
         assert_eq!(range(&[0.0]), None);

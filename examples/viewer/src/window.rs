@@ -29,21 +29,15 @@ impl Window {
         let attributes = winit::window::Window::default_attributes()
             .with_title(title)
             .with_inner_size(PhysicalSize::new(size[0], size[1]));
-        let handle = event_loop
-            .create_window(attributes)
-            .map_err(|e| no_window(&e))?;
+        let handle = event_loop.create_window(attributes).map_err(|e| no_window(&e))?;
         let handle = Arc::new(handle);
-        let instance =
-            wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         let surface = create_surface(&instance, &handle)?;
-        let request = wgpu::RequestAdapterOptions {
-            compatible_surface: Some(&surface),
-            ..Default::default()
-        };
-        let adapter =
-            pollster::block_on(instance.request_adapter(&request)).map_err(|e| no_window(&e))?;
-        let (device, queue) = pollster::block_on(adapter.request_device(&Default::default()))
-            .map_err(|e| no_window(&e))?;
+        let request =
+            wgpu::RequestAdapterOptions { compatible_surface: Some(&surface), ..Default::default() };
+        let adapter = pollster::block_on(instance.request_adapter(&request)).map_err(|e| no_window(&e))?;
+        let (device, queue) =
+            pollster::block_on(adapter.request_device(&Default::default())).map_err(|e| no_window(&e))?;
         let mut config = surface
             .get_default_config(&adapter, size[0], size[1])
             .ok_or_else(|| no_window(&"the adapter cannot draw in it"))?;
@@ -72,16 +66,7 @@ impl Window {
         let painter = egui_wgpu::Renderer::new(&device, config.format, Default::default());
         // Configured when it is first painted, to the size that it then has.
         config.width = 0;
-        Ok(Self {
-            handle,
-            instance,
-            device,
-            queue,
-            surface,
-            config,
-            egui,
-            painter,
-        })
+        Ok(Self { handle, instance, device, queue, surface, config, egui, painter })
     }
 
     pub fn context(&self) -> &egui::Context {
@@ -115,13 +100,11 @@ impl Window {
             .viewport_output
             .get(&egui::ViewportId::ROOT)
             .map_or(Duration::MAX, |viewport| viewport.repaint_delay);
-        self.egui
-            .handle_platform_output(&self.handle, output.platform_output);
+        self.egui.handle_platform_output(&self.handle, output.platform_output);
         // Also where there is nothing to paint to: they come only once.
         for (id, deltas) in &output.textures_delta.set {
             for delta in deltas {
-                self.painter
-                    .update_texture(&self.device, &self.queue, *id, delta);
+                self.painter.update_texture(&self.device, &self.queue, *id, delta);
             }
         }
         match self.target(size)? {
@@ -172,8 +155,7 @@ impl Window {
         let view = target.texture.create_view(&Default::default());
         let mut encoder = self.device.create_command_encoder(&Default::default());
         let mut commands =
-            self.painter
-                .update_buffers(&self.device, &self.queue, &mut encoder, shapes, &screen);
+            self.painter.update_buffers(&self.device, &self.queue, &mut encoder, shapes, &screen);
         let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("viewer"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -187,8 +169,7 @@ impl Window {
             })],
             ..Default::default()
         });
-        self.painter
-            .render(&mut pass.forget_lifetime(), shapes, &screen);
+        self.painter.render(&mut pass.forget_lifetime(), shapes, &screen);
         commands.push(encoder.finish());
         self.queue.submit(commands);
         self.handle.pre_present_notify();
@@ -200,9 +181,7 @@ fn create_surface(
     instance: &wgpu::Instance,
     window: &Arc<winit::window::Window>,
 ) -> Result<wgpu::Surface<'static>, Error> {
-    instance
-        .create_surface(Arc::clone(window))
-        .map_err(|e| no_window(&e))
+    instance.create_surface(Arc::clone(window)).map_err(|e| no_window(&e))
 }
 
 /// Why there is no window, on one line.
@@ -210,10 +189,7 @@ pub fn no_window(error: &dyn std::fmt::Display) -> Error {
     let error = error.to_string().replace('\n', " ");
     // Some start with the place in winit's source where they come from.
     let reason = error.rsplit(".rs:").next().unwrap_or(&error);
-    let got = format!(
-        "none ({})",
-        reason.trim_start_matches(|c: char| !c.is_alphabetic())
-    );
+    let got = format!("none ({})", reason.trim_start_matches(|c: char| !c.is_alphabetic()));
     let needs = "a desktop to open it on, which the graphics driver can draw on; on Linux, X11";
     Error::new("window", got, needs)
 }

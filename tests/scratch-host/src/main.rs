@@ -66,9 +66,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for (view, (camera, fov, effect)) in views.iter_mut().zip(shots) {
         let [light, out, id, depth] = [Rgba16Float, Rgba16Float, R8Uint, Depth32Float].map(target);
         let ops = Operations::default(); // clears to 0: no light, no id
-        let color = |view| {
-            Some(RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
-        };
+        let color =
+            |view| Some(RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops });
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             color_attachments: &[color(&light), color(&out), color(&id)],
             depth_stencil_attachment: Some(RenderPassDepthStencilAttachment {

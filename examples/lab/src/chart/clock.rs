@@ -24,14 +24,8 @@ pub struct Clock {
 impl Clock {
     pub fn new(gpu: &Gpu) -> Self {
         match gpu.is_cpu {
-            true => Self {
-                timestamps: None,
-                long_enough_ms: 0.0,
-            },
-            false => Self {
-                timestamps: Timestamps::new(gpu, 2),
-                long_enough_ms: LONG_ENOUGH_MS,
-            },
+            true => Self { timestamps: None, long_enough_ms: 0.0 },
+            false => Self { timestamps: Timestamps::new(gpu, 2), long_enough_ms: LONG_ENOUGH_MS },
         }
     }
 
@@ -81,8 +75,7 @@ impl Clock {
         output: &TextureView,
         repeats: u32,
     ) -> Result<f64, Error> {
-        let render =
-            |encoder: &mut _| (0..repeats).try_for_each(|_| method.render(encoder, output));
+        let render = |encoder: &mut _| (0..repeats).try_for_each(|_| method.render(encoder, output));
         let ms = match &self.timestamps {
             Some(timestamps) => {
                 let (rendered, times) = timestamps.run(gpu, |encoder| {
@@ -143,11 +136,7 @@ pub fn host_cost(
         drop(commands);
         gpu.run(|_| ());
     }
-    Ok(HostCost {
-        prepare_us: median(&prepare),
-        render_us: median(&render),
-        upload_bytes,
-    })
+    Ok(HostCost { prepare_us: median(&prepare), render_us: median(&render), upload_bytes })
 }
 
 /// Rounds that a method takes part in.
@@ -186,11 +175,7 @@ pub fn rounds(
             break;
         }
         for i in 0..methods.len() {
-            let i = if round % 2 == 0 {
-                i
-            } else {
-                methods.len() - 1 - i
-            };
+            let i = if round % 2 == 0 { i } else { methods.len() - 1 - i };
             let (method, output, compared) = methods[i];
             if round < rounds.all || compared && round < rounds.compared {
                 times[i].push(clock.ms(gpu, method, output, repeats[i])?);
@@ -228,9 +213,8 @@ pub fn ratio(times: &[f64], base: &[f64]) -> (f64, [f64; 2]) {
         state ^= state << 17;
         ratios[(state % ratios.len() as u64) as usize]
     };
-    let mut medians: Vec<f64> = (0..DRAWS)
-        .map(|_| median(&(0..ratios.len()).map(|_| draw()).collect::<Vec<_>>()))
-        .collect();
+    let mut medians: Vec<f64> =
+        (0..DRAWS).map(|_| median(&(0..ratios.len()).map(|_| draw()).collect::<Vec<_>>())).collect();
     medians.sort_unstable_by(f64::total_cmp);
     let interval = [0.025, 0.975].map(|share| medians[(share * DRAWS as f64) as usize]);
     (median(&ratios), interval)
@@ -240,8 +224,7 @@ pub fn ratio(times: &[f64], base: &[f64]) -> (f64, [f64; 2]) {
 mod tests {
     use subsurface::Frame;
     use subsurface::wgpu::{
-        Buffer, BufferDescriptor, BufferUsages, CommandEncoder, Device, Features, Queue,
-        TextureFormat,
+        Buffer, BufferDescriptor, BufferUsages, CommandEncoder, Device, Features, Queue, TextureFormat,
     };
 
     use super::*;
@@ -279,10 +262,7 @@ mod tests {
             mapped_at_creation: false,
         }));
         for timestamps in [None, Timestamps::new(&gpu, 2)] {
-            let clock = Clock {
-                timestamps,
-                long_enough_ms: 5.0,
-            };
+            let clock = Clock { timestamps, long_enough_ms: 5.0 };
             let repeats = clock.repeats(&gpu, &clear, &output).unwrap();
             let ms = clock.ms(&gpu, &clear, &output, repeats).unwrap();
             println!("{}: {repeats} times {ms} ms", clock.name());
@@ -304,16 +284,9 @@ mod tests {
         let drift = (0..31).map(|i| 1.0 + f64::from(i) / 15.0);
         let base: Vec<f64> = drift.collect();
         let noise = |i: usize| 1.0 + 0.1 * (7.3 * i as f64).sin();
-        let times: Vec<f64> = base
-            .iter()
-            .enumerate()
-            .map(|(i, b)| 2.0 * b * noise(i))
-            .collect();
+        let times: Vec<f64> = base.iter().enumerate().map(|(i, b)| 2.0 * b * noise(i)).collect();
         let (ratio, [low, high]) = ratio(&times, &base);
         assert!((ratio - 2.0).abs() < 0.1, "{ratio}");
-        assert!(
-            low <= ratio && ratio <= high && low > 1.8 && high < 2.2,
-            "{low} {high}"
-        );
+        assert!(low <= ratio && ratio <= high && low > 1.8 && high < 2.2, "{low} {high}");
     }
 }

@@ -17,25 +17,15 @@ const NEAR_PX_PER_MM: f32 = 20.0;
 ///
 /// # Errors
 /// A size that the device cannot render; a model without skin in view.
-pub fn scenes(
-    gpu: &Gpu,
-    model: &Model,
-    mm_per_unit: f32,
-    size: [u32; 2],
-) -> Result<[Scene; 4], Error> {
+pub fn scenes(gpu: &Gpu, model: &Model, mm_per_unit: f32, size: [u32; 2]) -> Result<[Scene; 4], Error> {
     let [empty, far, face, near] = SCENES;
     let head = |name, camera| Scene::head(gpu, model, mm_per_unit, name, size, camera);
     let close_up = Camera::framing(model, View::CloseUp, size);
     let closer = close_up.px_per_unit(size) / (NEAR_PX_PER_MM * mm_per_unit);
-    let narrowed = Camera {
-        fov_y: 2.0 * (closer * (close_up.fov_y / 2.0).tan()).atan(),
-        ..close_up
-    };
+    let narrowed = Camera { fov_y: 2.0 * (closer * (close_up.fov_y / 2.0).tan()).atan(), ..close_up };
     Ok([
         flat(gpu, empty, size, FAR_PX_PER_MM, |_| None),
-        flat(gpu, far, size, FAR_PX_PER_MM, |at: DVec2| {
-            Some(f64::from(at.x > 0.0))
-        }),
+        flat(gpu, far, size, FAR_PX_PER_MM, |at: DVec2| Some(f64::from(at.x > 0.0))),
         head(face, Camera::framing(model, View::Front, size))?,
         head(near, narrowed)?,
     ])

@@ -32,14 +32,8 @@ pub type File = (String, Vec<u8>);
 /// `about` is no object, or has a key that the rows or heads take; a picture that cannot be made.
 pub fn files(chart: &Chart) -> Result<Vec<File>, Box<dyn Error>> {
     let drawings: Vec<(&str, String)> = [
-        (
-            "error_time",
-            error_time(chart.rows, &VISIBLE, chart.caption),
-        ),
-        (
-            "error_time_eq7",
-            error_time(chart.rows, &EQ7, chart.caption),
-        ),
+        ("error_time", error_time(chart.rows, &VISIBLE, chart.caption)),
+        ("error_time_eq7", error_time(chart.rows, &EQ7, chart.caption)),
         ("width", width(chart.rows, chart.caption)),
         ("heads", heads(chart.heads, chart.caption)),
     ]
@@ -80,32 +74,23 @@ const COLUMNS: [Column; 19] = [
     ("max_error_visible", |row| number(row.max_error_visible)),
     ("rel_rmse_eq7", |row| number(row.rel_rmse_eq7)),
     ("max_error_eq7", |row| number(row.max_error_eq7)),
-    ("rel_rmse_eq7_normalised", |row| {
-        number(row.rel_rmse_eq7_normalised)
-    }),
+    ("rel_rmse_eq7_normalised", |row| number(row.rel_rmse_eq7_normalised)),
     ("delta_e2000_p99", |row| number(row.delta_e2000_p99)),
     ("flip_mean", |row| number(row.flip_mean)),
     ("energy_ratio", |row| number(row.energy_ratio)),
-    ("scratch_bytes_per_pixel", |row| {
-        number(row.scratch_bytes_per_pixel)
-    }),
+    ("scratch_bytes_per_pixel", |row| number(row.scratch_bytes_per_pixel)),
 ];
 
 /// As many digits as it takes to read the same number back; nothing where there is no figure.
 fn number(value: Option<f64>) -> String {
-    value
-        .filter(|value| value.is_finite())
-        .map_or(String::new(), |value| value.to_string())
+    value.filter(|value| value.is_finite()).map_or(String::new(), |value| value.to_string())
 }
 
 /// `chart.csv`. Names and settings are the chart's own and hold no commas.
 fn csv(rows: &[Row]) -> String {
     let header = COLUMNS.map(|(name, _)| name.to_string());
     let lines = rows.iter().map(|row| COLUMNS.map(|(_, cell)| cell(row)));
-    std::iter::once(header)
-        .chain(lines)
-        .map(|cells| cells.join(",") + "\n")
-        .collect()
+    std::iter::once(header).chain(lines).map(|cells| cells.join(",") + "\n").collect()
 }
 
 /// `chart.json`. A figure without a value is null.
@@ -124,11 +109,7 @@ fn json(chart: &Chart) -> Result<String, Box<dyn Error>> {
             return Err(format!("about: {key} is taken").into());
         }
     }
-    let file = File {
-        about,
-        rows: chart.rows,
-        heads: chart.heads,
-    };
+    let file = File { about, rows: chart.rows, heads: chart.heads };
     Ok(serde_json::to_string_pretty(&file)? + "\n")
 }
 
@@ -141,13 +122,7 @@ mod tests {
 
     /// A chart of rows alone.
     fn chart_of(rows: &[Row]) -> Vec<File> {
-        let chart = Chart {
-            rows,
-            about: &json!({}),
-            caption: "",
-            heads: &[],
-            images: &[],
-        };
+        let chart = Chart { rows, about: &json!({}), caption: "", heads: &[], images: &[] };
         files(&chart).unwrap()
     }
 
@@ -194,13 +169,7 @@ mod tests {
     fn the_json_holds_rows_and_what_it_is_told() {
         let rows = fixture::rows();
         let about = json!({"adapter": "llvmpipe", "notes": ["a"], "intervals": [[0.1, 0.2]]});
-        let chart = Chart {
-            rows: &rows,
-            about: &about,
-            caption: "",
-            heads: &[],
-            images: &[],
-        };
+        let chart = Chart { rows: &rows, about: &about, caption: "", heads: &[], images: &[] };
         let read: Value = serde_json::from_str(&json(&chart).unwrap()).unwrap();
         assert_eq!(read["adapter"], "llvmpipe");
         assert_eq!(read["intervals"], about["intervals"]);
@@ -208,13 +177,7 @@ mod tests {
         assert_eq!(read["rows"], written);
 
         for about in [json!([]), json!({"rows": 1})] {
-            assert!(
-                json(&Chart {
-                    about: &about,
-                    ..chart
-                })
-                .is_err()
-            );
+            assert!(json(&Chart { about: &about, ..chart }).is_err());
         }
     }
 
@@ -241,14 +204,7 @@ mod tests {
     #[test]
     fn odd_figures_and_names_break_no_picture() {
         let mut rows = fixture::rows();
-        let odd = [
-            None,
-            Some(0.0),
-            Some(-1.0),
-            Some(f64::NAN),
-            Some(f64::INFINITY),
-            Some(1e-300),
-        ];
+        let odd = [None, Some(0.0), Some(-1.0), Some(f64::NAN), Some(f64::INFINITY), Some(1e-300)];
         for (i, row) in rows.iter_mut().enumerate().filter(|(i, _)| i % 2 == 0) {
             let figure = odd[i / 2 % odd.len()];
             row.rel_rmse_visible = figure;
@@ -264,27 +220,15 @@ mod tests {
             points: vec![(1.0, f64::NAN), (0.0, 0.0), (4.0, f64::INFINITY)],
             extrapolated_from: Some(7),
         }];
-        let chart = Chart {
-            rows: &rows,
-            about: &json!({}),
-            caption: "a < b & c",
-            heads: &heads,
-            images: &[],
-        };
+        let chart =
+            Chart { rows: &rows, about: &json!({}), caption: "a < b & c", heads: &heads, images: &[] };
         let files = files(&chart).unwrap();
         assert_eq!(files.len(), 11);
         for (name, bytes) in &files {
             let is_text = !name.ends_with(".png");
-            let text = if is_text {
-                std::str::from_utf8(bytes).unwrap()
-            } else {
-                ""
-            };
+            let text = if is_text { std::str::from_utf8(bytes).unwrap() } else { "" };
             assert!(!text.contains("NaN") && !text.contains("=\"inf"), "{name}");
-            assert!(
-                !text.contains("<odd>") || name.starts_with("chart."),
-                "{name}"
-            );
+            assert!(!text.contains("<odd>") || name.starts_with("chart."), "{name}");
         }
     }
 

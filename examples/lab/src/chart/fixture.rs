@@ -58,11 +58,7 @@ pub fn rows() -> Vec<Row> {
             let x_copy = cost * f64::powf(px_per_mm, power) * jitter;
             let width_px = 1.176 * px_per_mm;
             let unscattered = 0.03 * width_px / (1.0 + 0.1 * width_px);
-            let rel_rmse = if i < 2 {
-                unscattered
-            } else {
-                unscattered * error * jitter
-            };
+            let rel_rmse = if i < 2 { unscattered } else { unscattered * error * jitter };
             let in_texture = method.starts_with("texture");
             let on_screen = |value: f64| (!in_texture).then_some(value);
             let on_head = |value: f64| (!scene.starts_with("edge")).then_some(value);
@@ -81,11 +77,7 @@ pub fn rows() -> Vec<Row> {
                 max_error_visible: on_screen(4.0 * rel_rmse),
                 rel_rmse_eq7: on_head(1.1 * rel_rmse + 0.02),
                 max_error_eq7: on_head(6.0 * rel_rmse + 0.1),
-                rel_rmse_eq7_normalised: on_head(if in_texture {
-                    rel_rmse
-                } else {
-                    rel_rmse + 0.008
-                }),
+                rel_rmse_eq7_normalised: on_head(if in_texture { rel_rmse } else { rel_rmse + 0.008 }),
                 delta_e2000_p99: on_screen(60.0 * rel_rmse),
                 flip_mean: on_screen(0.8 * rel_rmse),
                 energy_ratio: on_screen(1.0 - 0.02 * rel_rmse),
@@ -99,9 +91,7 @@ pub fn rows() -> Vec<Row> {
 pub fn heads() -> Vec<Series> {
     let series = |name: &str, fixed: f64, each: f64, extrapolated_from| Series {
         name: name.into(),
-        points: [1.0, 2.0, 4.0, 8.0, 16.0]
-            .map(|count| (count, 1000.0 / (fixed + each * count)))
-            .into(),
+        points: [1.0, 2.0, 4.0, 8.0, 16.0].map(|count| (count, 1000.0 / (fixed + each * count))).into(),
         extrapolated_from,
     };
     vec![
@@ -118,17 +108,13 @@ pub fn heads() -> Vec<Series> {
 
 pub fn images() -> Vec<SceneImages> {
     let picture = |shade: u32| {
-        RgbImage::from_fn(96, 72, |x, y| {
-            Rgb([(x * 2) as u8, (y * 3) as u8, (shade * 40) as u8])
-        })
+        RgbImage::from_fn(96, 72, |x, y| Rgb([(x * 2) as u8, (y * 3) as u8, (shade * 40) as u8]))
     };
     ["front", "profile"]
         .map(|scene| SceneImages {
             scene: scene.into(),
             truth: picture(0),
-            entries: (1..5)
-                .map(|i| (format!("method {i}"), picture(i), picture(5 + i)))
-                .collect(),
+            entries: (1..5).map(|i| (format!("method {i}"), picture(i), picture(5 + i))).collect(),
         })
         .into()
 }

@@ -73,11 +73,7 @@ pub fn figure(
     }
     let mut series = Vec::new();
     if screen.is_some() {
-        series.push(Series {
-            name: "screen_exact".into(),
-            points: on_screen,
-            extrapolated_from: None,
-        });
+        series.push(Series { name: "screen_exact".into(), points: on_screen, extrapolated_from: None });
     }
     for (t, points) in textured.iter().zip(in_texture) {
         series.push(Series {
@@ -138,10 +134,7 @@ fn crowd(
 ) -> Result<Scene, Error> {
     let rows = heads / columns;
     let wide = (columns as f64 / rows as f64).sqrt();
-    let size = [
-        (f64::from(size[0]) * wide).round() as u32,
-        (f64::from(size[1]) / wide).round() as u32,
-    ];
+    let size = [(f64::from(size[0]) * wide).round() as u32, (f64::from(size[1]) / wide).round() as u32];
     let one = Camera::framing(model, View::Front, [size[1], size[1]]);
     let back = one.eye - one.target;
     // What a frame of one head shows, from edge to edge.
@@ -161,16 +154,6 @@ fn crowd(
             crowd.primitives.push(primitive);
         }
     }
-    let camera = Camera {
-        eye: one.target + back * rows as f32,
-        ..one
-    };
-    Scene::head(
-        gpu,
-        &crowd,
-        mm_per_unit,
-        &format!("{heads} heads"),
-        size,
-        camera,
-    )
+    let camera = Camera { eye: one.target + back * rows as f32, ..one };
+    Scene::head(gpu, &crowd, mm_per_unit, &format!("{heads} heads"), size, camera)
 }

@@ -89,15 +89,7 @@ impl<'a> Lab<'a> {
             let plan = subsurface::Plan::new(&[Profile::SKIN], 1.0 / f32::from(steps))?;
             plans.push((format!("1/{steps}"), plan));
         }
-        Ok(Self {
-            clock: Clock::new(&gpu),
-            gpu,
-            plan,
-            bar,
-            plans,
-            model,
-            options,
-        })
+        Ok(Self { clock: Clock::new(&gpu), gpu, plan, bar, plans, model, options })
     }
 
     fn wanted(&self, method: &str) -> bool {
@@ -119,28 +111,15 @@ impl<'a> Lab<'a> {
     /// A scene that cannot be drawn; a cache that cannot be written.
     pub fn scene(&self, name: &str) -> Result<Done, Error> {
         let Self { gpu, model, .. } = self;
-        let Plan {
-            size, wide, stride, ..
-        } = self.plan;
+        let Plan { size, wide, stride, .. } = self.plan;
         self.begin(format!("{name}: drawing"), 1);
-        let scene = Scene::new(
-            gpu,
-            model,
-            self.options.mm_per_unit,
-            name,
-            [size, wide],
-            stride,
-        )?;
+        let scene = Scene::new(gpu, model, self.options.mm_per_unit, name, [size, wide], stride)?;
         let cache = &self.options.cache;
         let truths = Truths::of(gpu, model, &scene, &Profile::SKIN, cache, &self.bar)?;
         let score = Score::new(&scene, &truths, read(gpu, &scene, &scene.irradiance));
         let mut done = Done::default();
         let [rel_rmse_eq7, rel_rmse_eq7_normalised] = score.visibility_error();
-        done.visibility.push(Visibility {
-            scene: name.into(),
-            rel_rmse_eq7,
-            rel_rmse_eq7_normalised,
-        });
+        done.visibility.push(Visibility { scene: name.into(), rel_rmse_eq7, rel_rmse_eq7_normalised });
         let copy_ms = self.screen(&scene, &score, &mut done)?;
         if let Surface::Head(head) = &scene.surface {
             self.textures(&scene, head, &score, copy_ms, &mut done)?;
@@ -157,10 +136,7 @@ impl<'a> Lab<'a> {
         methods.insert(1, ("screen_exact", String::new(), Box::new(exact)));
         for (i, (setting, plan)) in self.plans.iter().enumerate() {
             let planned = Ours::new(device, OUTPUT, plan)?;
-            methods.insert(
-                2 + i,
-                ("screen_planned", setting.clone(), Box::new(planned)),
-            );
+            methods.insert(2 + i, ("screen_planned", setting.clone(), Box::new(planned)));
         }
         methods.retain(|(name, ..)| self.wanted(name));
         Ok(methods)
@@ -208,13 +184,7 @@ impl<'a> Lab<'a> {
         if self.wanted("none") {
             let mut row = empty_row(scene, "none", "");
             score.fill(&mut row, &results[0], Knows::Frame);
-            show(
-                &mut images,
-                score,
-                "no scattering",
-                &results[0],
-                Knows::Frame,
-            );
+            show(&mut images, score, "no scattering", &results[0], Knows::Frame);
             done.rows.push(row);
         }
         for (i, (name, setting, method)) in methods.iter().enumerate() {
@@ -228,17 +198,10 @@ impl<'a> Lab<'a> {
             };
             score.fill(&mut row, &results[i], Knows::Frame);
             if *name != "copy" {
-                show(
-                    &mut images,
-                    score,
-                    &format!("{name} {setting}"),
-                    &results[i],
-                    Knows::Frame,
-                );
+                show(&mut images, score, &format!("{name} {setting}"), &results[i], Knows::Frame);
             }
             done.rows.push(row);
-            done.intervals
-                .push(interval(scene, name, setting, times[i].len(), interval_95));
+            done.intervals.push(interval(scene, name, setting, times[i].len(), interval_95));
         }
         done.keep_images(&images)?;
         Ok(clock::median(&times[0]))
@@ -277,15 +240,10 @@ impl<'a> Lab<'a> {
             };
             // One run warms up, and tells whether the model has UVs at all.
             if let Err(error) = run() {
-                done.notes
-                    .push(format!("{}: no texture space: {error}.", scene.name));
+                done.notes.push(format!("{}: no texture space: {error}.", scene.name));
                 return Ok(());
             }
-            let runs = if name == "texture_2d" {
-                1
-            } else {
-                self.plan.atlas_runs
-            };
+            let runs = if name == "texture_2d" { 1 } else { self.plan.atlas_runs };
             let since = Instant::now();
             let mut times = Vec::new();
             while times.is_empty()
@@ -309,10 +267,7 @@ impl<'a> Lab<'a> {
             show(&mut images, score, &label, &result, Knows::Mesh);
             done.rows.push(row);
             let runs = times.len();
-            done.notes.push(format!(
-                "{}: {label} is the median of {runs} runs.",
-                scene.name
-            ));
+            done.notes.push(format!("{}: {label} is the median of {runs} runs.", scene.name));
             self.bar.inc(1);
         }
         done.keep_images(&images)
@@ -363,15 +318,13 @@ impl<'a> Lab<'a> {
                     scratch_bytes_per_pixel: Some(method.scratch_bytes_per_pixel()),
                     ..empty_row(scene, name, setting)
                 });
-                done.intervals
-                    .push(interval(scene, name, setting, times.len(), interval_95));
+                done.intervals.push(interval(scene, name, setting, times.len(), interval_95));
             }
         }
         for (m, (name, setting, _)) in methods[0].iter().enumerate().skip(1) {
             let of_method = std::array::from_fn(|s| times[s * count + m].as_slice());
             let name = format!("{name} {setting}");
-            done.notes
-                .push(costs::note(&name, of_method, &times[0], &scenes));
+            done.notes.push(costs::note(&name, of_method, &times[0], &scenes));
         }
         Ok(done)
     }
@@ -419,11 +372,7 @@ impl<'a> Lab<'a> {
                 self.bar.set_message(what.to_owned());
             },
         )?;
-        Ok(Done {
-            heads,
-            notes,
-            ..Default::default()
-        })
+        Ok(Done { heads, notes, ..Default::default() })
     }
 }
 
@@ -441,13 +390,7 @@ fn images_of(scene: &str, score: &Score, knows: Knows) -> SceneImages {
     }
 }
 
-fn interval(
-    scene: &Scene,
-    method: &str,
-    setting: &str,
-    runs: usize,
-    interval_95: [f64; 2],
-) -> Interval {
+fn interval(scene: &Scene, method: &str, setting: &str, runs: usize, interval_95: [f64; 2]) -> Interval {
     Interval {
         scene: scene.name.clone(),
         method: method.into(),

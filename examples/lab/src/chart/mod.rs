@@ -55,29 +55,18 @@ fn chart(options: &Options) -> Result<(), Error> {
     let started = Instant::now();
     let (model_name, model) = match &options.model {
         Some(path) => (path.display().to_string(), Model::load(path)?),
-        None => (
-            "the built-in head (MakeHuman base mesh, CC0)".to_owned(),
-            Model::from_glb(crate::HEAD)?,
-        ),
+        None => ("the built-in head (MakeHuman base mesh, CC0)".to_owned(), Model::from_glb(crate::HEAD)?),
     };
     let (least, greatest) = model.skin_bounds();
     let extent_mm = (greatest - least).max_element() * options.mm_per_unit;
     if extent_mm > TALLEST_MM {
         let got = format!("a model of {extent_mm} mm");
-        return Err(Error::new(
-            "--mm-per-unit",
-            got,
-            format!("at most {TALLEST_MM} mm"),
-        ));
+        return Err(Error::new("--mm-per-unit", got, format!("at most {TALLEST_MM} mm")));
     }
     let mut scenes = scene::names();
     scenes.extend(["costs".into(), "heads".into()]);
     let scenes = chosen("--scenes", options.scenes.as_ref(), scenes)?;
-    chosen(
-        "--methods",
-        options.methods.as_ref(),
-        METHODS.map(String::from).to_vec(),
-    )?;
+    chosen("--methods", options.methods.as_ref(), METHODS.map(String::from).to_vec())?;
 
     let mut model_hash = DefaultHasher::new();
     truths::hash_model(&model, &mut model_hash);
@@ -124,10 +113,7 @@ fn chart(options: &Options) -> Result<(), Error> {
     let command: Vec<String> = std::env::args().skip(1).collect();
     let command = match command.as_slice() {
         [] => "cargo run --release --example chart".into(),
-        options => format!(
-            "cargo run --release --example chart -- {}",
-            options.join(" ")
-        ),
+        options => format!("cargo run --release --example chart -- {}", options.join(" ")),
     };
     let [width, height] = lab.plan.size;
     let commit = commit();
@@ -160,20 +146,12 @@ fn chart(options: &Options) -> Result<(), Error> {
     progress.forget();
     lab.bar.finish_and_clear();
     println!("{}", table(&rows));
-    println!(
-        "{} in {:.0} s",
-        options.out.join("report.html").display(),
-        started.elapsed().as_secs_f64()
-    );
+    println!("{} in {:.0} s", options.out.join("report.html").display(), started.elapsed().as_secs_f64());
     Ok(())
 }
 
 /// What was asked for of `known`, or all of it.
-fn chosen(
-    option: &str,
-    asked: Option<&Vec<String>>,
-    known: Vec<String>,
-) -> Result<Vec<String>, Error> {
+fn chosen(option: &str, asked: Option<&Vec<String>>, known: Vec<String>) -> Result<Vec<String>, Error> {
     let Some(asked) = asked else {
         return Ok(known);
     };
@@ -212,13 +190,7 @@ fn notes(plan: &Plan) -> Vec<String> {
 /// What was measured: the commit, and whether the tree was changed since.
 fn commit() -> String {
     let git = std::process::Command::new("git")
-        .args([
-            "describe",
-            "--always",
-            "--dirty",
-            "--abbrev=12",
-            "--exclude=*",
-        ])
+        .args(["describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"])
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output();
     let text = git.ok().filter(|git| git.status.success());
@@ -228,10 +200,7 @@ fn commit() -> String {
 
 /// What a host's CPU spends on a frame, over all scenes.
 fn host_note(host: &[&Host]) -> Option<String> {
-    let names: Vec<String> = host
-        .iter()
-        .map(|h| format!("{} {}", h.method, h.setting))
-        .collect();
+    let names: Vec<String> = host.iter().map(|h| format!("{} {}", h.method, h.setting)).collect();
     let of_method = |name: &str| {
         let of = |value: fn(&Host) -> f64| {
             let mine = names.iter().zip(host).filter(|(n, _)| *n == name);

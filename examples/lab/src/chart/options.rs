@@ -130,11 +130,7 @@ impl Plan {
             return Self {
                 size: size(256),
                 wide: [960, 540],
-                rounds: Rounds {
-                    all: 3,
-                    compared: 3,
-                    seconds: 2.0,
-                },
+                rounds: Rounds { all: 3, compared: 3, seconds: 2.0 },
                 stride: 4,
                 atlases: &[256, 512],
                 heads: &[5, 3],
@@ -146,11 +142,7 @@ impl Plan {
         Self {
             size: size(512),
             wide: [1920, 1080],
-            rounds: Rounds {
-                all: 9,
-                compared: 31,
-                seconds: 30.0,
-            },
+            rounds: Rounds { all: 9, compared: 31, seconds: 30.0 },
             stride: 2,
             atlases: &[512, 1024],
             heads: &[5, 5],

@@ -80,11 +80,7 @@ impl Done {
         for (label, picture, error) in &images.entries {
             entries.push((label.clone(), text(picture)?, text(error)?));
         }
-        self.pictures.push(Images {
-            scene: images.scene.clone(),
-            truth: text(&images.truth)?,
-            entries,
-        });
+        self.pictures.push(Images { scene: images.scene.clone(), truth: text(&images.truth)?, entries });
         Ok(())
     }
 
@@ -103,11 +99,7 @@ impl Done {
             for (label, shown, error) in &images.entries {
                 entries.push((label.clone(), picture(shown)?, picture(error)?));
             }
-            Ok(SceneImages {
-                scene: images.scene.clone(),
-                truth: picture(&images.truth)?,
-                entries,
-            })
+            Ok(SceneImages { scene: images.scene.clone(), truth: picture(&images.truth)?, entries })
         });
         all.collect()
     }
@@ -131,9 +123,7 @@ impl Progress {
             .map_err(|e| Error::new("chart", format!("\"{e}\""), "to read its own program"))?;
         let mut hasher = DefaultHasher::new();
         (settings, program).hash(&mut hasher);
-        Ok(Self {
-            directory: cache.join(format!("run-{:016x}", hasher.finish())),
-        })
+        Ok(Self { directory: cache.join(format!("run-{:016x}", hasher.finish())) })
     }
 
     /// A scene that an earlier run has done.
@@ -166,10 +156,7 @@ mod tests {
     fn a_finished_scene_is_found_again_by_the_same_command_alone() {
         let cache = std::env::temp_dir().join(format!("progress-{}", std::process::id()));
         let picture = RgbImage::from_fn(3, 2, |x, y| image::Rgb([x as u8, y as u8, 9]));
-        let mut done = Done {
-            notes: vec!["a note".into()],
-            ..Default::default()
-        };
+        let mut done = Done { notes: vec!["a note".into()], ..Default::default() };
         let images = SceneImages {
             scene: "front".into(),
             truth: picture.clone(),
@@ -180,10 +167,7 @@ mod tests {
         let progress = Progress::new(&cache, "chart").unwrap();
         assert!(progress.read("front").is_none());
         progress.keep("front", &done).unwrap();
-        let found = Progress::new(&cache, "chart")
-            .unwrap()
-            .read("front")
-            .unwrap();
+        let found = Progress::new(&cache, "chart").unwrap().read("front").unwrap();
         assert_eq!(found.notes, done.notes);
         let found = found.images().unwrap().remove(0);
         assert_eq!(found.truth, picture);

@@ -21,57 +21,22 @@ pub struct SceneImages {
 }
 
 /// A column of the table: its heading, its unit, what it is of a row, and the text of that.
-type Column = (
-    &'static str,
-    &'static str,
-    fn(&Row) -> Option<f64>,
-    fn(f64) -> String,
-);
+type Column = (&'static str, &'static str, fn(&Row) -> Option<f64>, fn(f64) -> String);
 
 const COLUMNS: [Column; 13] = [
     ("Time", "ms", |row| Some(row.ms), rounded),
     ("Time", "copies", |row| Some(row.x_copy), rounded),
     ("Fetches", "per pixel", |row| row.fetches, rounded),
     ("RMSE, visible", "%", |row| row.rel_rmse_visible, percent),
-    (
-        "Largest, visible",
-        "linear",
-        |row| row.max_error_visible,
-        rounded,
-    ),
+    ("Largest, visible", "linear", |row| row.max_error_visible, rounded),
     ("RMSE, Eq.\u{a0}7", "%", |row| row.rel_rmse_eq7, percent),
-    (
-        "Largest, Eq.\u{a0}7",
-        "linear",
-        |row| row.max_error_eq7,
-        rounded,
-    ),
-    (
-        "RMSE, Eq.\u{a0}7, normalised",
-        "%",
-        |row| row.rel_rmse_eq7_normalised,
-        percent,
-    ),
+    ("Largest, Eq.\u{a0}7", "linear", |row| row.max_error_eq7, rounded),
+    ("RMSE, Eq.\u{a0}7, normalised", "%", |row| row.rel_rmse_eq7_normalised, percent),
     ("Colour, 99 %", "ΔE2000", |row| row.delta_e2000_p99, rounded),
     ("Mean FLIP", "0 to 1", |row| row.flip_mean, rounded),
-    (
-        "Energy",
-        "ratio",
-        |row| row.energy_ratio,
-        |ratio| format!("{ratio:.4}"),
-    ),
-    (
-        "Scratch",
-        "bytes/px",
-        |row| row.scratch_bytes_per_pixel,
-        rounded,
-    ),
-    (
-        "Skin",
-        "px",
-        |row| Some(row.skin_pixels as f64),
-        |count| format!("{count:.0}"),
-    ),
+    ("Energy", "ratio", |row| row.energy_ratio, |ratio| format!("{ratio:.4}")),
+    ("Scratch", "bytes/px", |row| row.scratch_bytes_per_pixel, rounded),
+    ("Skin", "px", |row| Some(row.skin_pixels as f64), |count| format!("{count:.0}")),
 ];
 
 fn percent(fraction: f64) -> String {
@@ -118,12 +83,7 @@ fn tables(page: &mut String, rows: &[Row]) {
     let styles = styles(rows.iter().map(|row| row.method.as_str()));
     for scene in distinct(rows.iter().map(|row| row.scene.as_str())) {
         let rows: Vec<&Row> = rows.iter().filter(|row| row.scene == scene).collect();
-        let Row {
-            width,
-            height,
-            px_per_mm,
-            ..
-        } = rows[0];
+        let Row { width, height, px_per_mm, .. } = rows[0];
         let (scene, px_per_mm) = (escape(scene), rounded(*px_per_mm));
         line(
             page,
@@ -133,10 +93,7 @@ fn tables(page: &mut String, rows: &[Row]) {
             ),
         );
         for (name, unit, ..) in COLUMNS {
-            line(
-                page,
-                &format!("<th scope=col>{name} <span>{unit}</span></th>"),
-            );
+            line(page, &format!("<th scope=col>{name} <span>{unit}</span></th>"));
         }
         line(page, "</tr></thead>\n<tbody>");
         for row in rows {

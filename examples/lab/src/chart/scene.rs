@@ -6,9 +6,7 @@ use half::f16;
 use subsurface::wgpu::{TextureFormat, TextureView};
 use subsurface::{Frame, Profile};
 
-use crate::renderer::{
-    Camera, Gpu, Lighting, Primitive, Probe, Renderer, Scene as Model, View, Visible,
-};
+use crate::renderer::{Camera, Gpu, Lighting, Primitive, Probe, Renderer, Scene as Model, View, Visible};
 use crate::truth::{Patch, Pixel, closed_form, even_steps};
 
 /// σ of red light in the skin profile, in mm, by which the edges are named.
@@ -22,15 +20,7 @@ pub const SPARSE: u32 = 2;
 
 /// Names of the scenes, in the order in which they are run.
 pub fn names() -> Vec<String> {
-    let heads = [
-        "front",
-        "three-quarter",
-        "close-up",
-        "far",
-        "profile",
-        "wide",
-        "sphere",
-    ];
+    let heads = ["front", "three-quarter", "close-up", "far", "profile", "wide", "sphere"];
     let edges = EDGES_PX.iter().map(|px| format!("edge_{px}"));
     heads.map(String::from).into_iter().chain(edges).collect()
 }
@@ -100,9 +90,7 @@ impl Scene {
             _ => {
                 let width = name.strip_prefix("edge_").and_then(|px| px.parse().ok());
                 return match width {
-                    Some(sigma_px) if EDGES_PX.contains(&sigma_px) => {
-                        Ok(edge(gpu, size, sigma_px, stride))
-                    }
+                    Some(sigma_px) if EDGES_PX.contains(&sigma_px) => Ok(edge(gpu, size, sigma_px, stride)),
                     _ => Err(Error::new("--scenes", name, names().join(", "))),
                 };
             }
@@ -127,11 +115,7 @@ impl Scene {
         renderer.render(gpu, &camera, &Lighting::default(), mm_per_unit)?;
         let visible = Probe::new(gpu, &renderer).visible(gpu, &renderer);
         let g = &renderer.gbuffer;
-        let skin: Vec<bool> = gpu
-            .read_bytes(g.profile_id.texture())
-            .iter()
-            .map(|id| *id == 1)
-            .collect();
+        let skin: Vec<bool> = gpu.read_bytes(g.profile_id.texture()).iter().map(|id| *id == 1).collect();
         let irradiance = gpu.read(&g.irradiance);
         let view = camera.view();
         let mm_per_px = 2.0 * (camera.fov_y / 2.0).tan() / size[1] as f32;
@@ -141,8 +125,7 @@ impl Scene {
         let pixels = (0..skin.len()).filter(|i| skin[*i]).map(|i| {
             let Visible { point_mm, steps_mm } = visible[i];
             let depth_mm = -view.transform_point3(point_mm / mm_per_unit).z * mm_per_unit;
-            let beside =
-                |x, y| Some(visible[skin_beside(&skin, size, i, x, y)?].point_mm - point_mm);
+            let beside = |x, y| Some(visible[skin_beside(&skin, size, i, x, y)?].point_mm - point_mm);
             Pixel {
                 patch: Patch {
                     point_mm,
@@ -187,8 +170,7 @@ impl Scene {
     pub fn asked<T: Copy>(&self, values: &[T]) -> Vec<T> {
         let stride = self.stride as usize;
         let rows = values.chunks(self.size[0] as usize).step_by(stride);
-        rows.flat_map(|row| row.iter().step_by(stride).copied())
-            .collect()
+        rows.flat_map(|row| row.iter().step_by(stride).copied()).collect()
     }
 }
 
@@ -230,10 +212,7 @@ fn skin_beside(skin: &[bool], size: [u32; 2], i: usize, x: i32, y: i32) -> Optio
 fn far(near: Camera, size: [u32; 2], mm_per_unit: f32) -> Camera {
     const PX_PER_MM: f32 = 0.3;
     let closer = near.px_per_unit(size) / (PX_PER_MM * mm_per_unit);
-    Camera {
-        eye: near.target + (near.eye - near.target) * closer,
-        ..near
-    }
+    Camera { eye: near.target + (near.eye - near.target) * closer, ..near }
 }
 
 /// What a ray along −Z finds: point, normal, irradiance, and the light that Eq. 7 scatters there.
@@ -256,12 +235,7 @@ fn sphere(gpu: &Gpu, size: [u32; 2], stride: u32) -> Scene {
             let point_mm = at.extend(z2.sqrt());
             let normal = point_mm / RHO_MM;
             let cosine = normal.dot(light);
-            Hit {
-                point_mm,
-                normal,
-                irradiance: cosine.max(0.0),
-                scattered: scattered(cosine),
-            }
+            Hit { point_mm, normal, irradiance: cosine.max(0.0), scattered: scattered(cosine) }
         })
     })
 }
@@ -330,9 +304,9 @@ fn orthographic(
             let e = found.as_ref().map_or(0.0, |h| h.irradiance);
             let bits = [e, e, e, 1.0].map(|c| f16::from_f64(c).to_bits());
             irradiance.push(bits);
-            depth.push(found.as_ref().map_or(0.0, |h| {
-                (projection.z_axis.z * (h.point_mm.z - 500.0) + 1.0) as f32
-            }));
+            depth.push(
+                found.as_ref().map_or(0.0, |h| (projection.z_axis.z * (h.point_mm.z - 500.0) + 1.0) as f32),
+            );
             id.push(u8::from(found.is_some()));
             skin.push(found.is_some());
             hits.push(found);
@@ -357,11 +331,7 @@ fn orthographic(
                 area_mm2: tangents[0].cross(tangents[1]).length() as f32,
                 irradiance: Vec3::splat(f16::from_bits(irradiance[i][0]).to_f32()),
             },
-            steps_mm: even_steps(
-                tangents.map(|t| t.as_vec3()),
-                px_per_mm.recip() as f32,
-                beside,
-            ),
+            steps_mm: even_steps(tangents.map(|t| t.as_vec3()), px_per_mm.recip() as f32, beside),
         });
         known.push(h.scattered.as_vec3());
     }

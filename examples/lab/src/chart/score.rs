@@ -52,11 +52,7 @@ impl<'a> Score<'a> {
     }
 
     fn layer(&self, values: impl Iterator<Item = Vec3>) -> Layer {
-        Layer {
-            width: self.size[0],
-            height: self.size[1],
-            pixels: values.map(|v| v.to_array()).collect(),
-        }
+        Layer { width: self.size[0], height: self.size[1], pixels: values.map(|v| v.to_array()).collect() }
     }
 
     fn lit(&self, values: &[Vec3]) -> Layer {
@@ -93,9 +89,7 @@ impl<'a> Score<'a> {
         let energy = |values: &[Vec3]| -> f64 {
             let pixels = values.iter().zip(&self.area_mm2).zip(mask);
             let inner = pixels.filter(|(_, inner)| **inner);
-            inner
-                .map(|((e, area), _)| f64::from(e.element_sum()) * area)
-                .sum()
+            inner.map(|((e, area), _)| f64::from(e.element_sum()) * area).sum()
         };
         row.energy_ratio = Some(energy(result) / energy(truth)).filter(|r| r.is_finite());
     }
@@ -113,9 +107,7 @@ impl<'a> Score<'a> {
     /// nothing is compared, so that FLIP does not see it.
     pub fn picture(&self, values: &[Vec3]) -> RgbImage {
         let pixels = values.iter().zip(&self.fallen).zip(&self.inner);
-        let shown: Vec<Vec3> = pixels
-            .map(|((v, e), inner)| if *inner { *v } else { *e })
-            .collect();
+        let shown: Vec<Vec3> = pixels.map(|((v, e), inner)| if *inner { *v } else { *e }).collect();
         let lit = self.lit(&shown);
         RgbImage::from_fn(lit.width, lit.height, |x, y| {
             let pixel = lit.pixels[(y * lit.width + x) as usize];

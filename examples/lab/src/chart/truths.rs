@@ -53,10 +53,7 @@ impl Truths {
         bar: &ProgressBar,
     ) -> Result<Self, Error> {
         let name = format!("{}-{:016x}.truth", scene.name, key(model, scene, profile));
-        if let Some(kept) = std::fs::read(cache.join(&name))
-            .ok()
-            .and_then(|b| Self::read(&b, scene))
-        {
+        if let Some(kept) = std::fs::read(cache.join(&name)).ok().and_then(|b| Self::read(&b, scene)) {
             return Ok(kept);
         }
         let truths = Self::compute(gpu, model, scene, profile, bar)?;
@@ -75,11 +72,7 @@ impl Truths {
         }
         let values: Vec<Vec3> = bytemuck::pod_collect_to_vec(bytes);
         let mut thirds = values.chunks(width * height).map(<[Vec3]>::to_vec);
-        Some(Self {
-            visible: thirds.next()?,
-            printed: thirds.next()?,
-            normalised: thirds.next()?,
-        })
+        Some(Self { visible: thirds.next()?, printed: thirds.next()?, normalised: thirds.next()? })
     }
 
     fn compute(
@@ -125,24 +118,11 @@ impl Truths {
             }
             Surface::Head(head) => {
                 let patches: Vec<Patch> = asked.iter().map(|i| scene.pixels[*i].patch).collect();
-                let truth = eq7(
-                    gpu,
-                    model,
-                    head,
-                    scene.mm_per_unit,
-                    &patches,
-                    profile,
-                    1.0,
-                    &progress,
-                );
+                let truth = eq7(gpu, model, head, scene.mm_per_unit, &patches, profile, 1.0, &progress);
                 (truth.printed, truth.normalised)
             }
         };
-        Ok(Self {
-            visible,
-            printed: whole(printed),
-            normalised: whole(normalised),
-        })
+        Ok(Self { visible, printed: whole(printed), normalised: whole(normalised) })
     }
 }
 
@@ -160,9 +140,7 @@ pub fn eq7(
 ) -> SurfaceIntegral {
     let probe = Probe::new(gpu, &head.renderer);
     let skin = model.primitives.iter().enumerate();
-    let skin: Vec<_> = skin
-        .filter(|(_, p)| model.materials[p.material].profile_id == 1)
-        .collect();
+    let skin: Vec<_> = skin.filter(|(_, p)| model.materials[p.material].profile_id == 1).collect();
     // All primitives as one mesh, and the first triangle of each.
     let (mut points, mut indices, mut firsts) = (Vec::new(), Vec::new(), Vec::new());
     for (_, primitive) in &skin {
@@ -173,29 +151,14 @@ pub fn eq7(
     }
     let light = |places: &[Place]| -> Result<Vec<Vec3>, std::convert::Infallible> {
         let owner = |p: &Place| firsts.partition_point(|first| *first <= p.triangle) - 1;
-        let runs = places
-            .chunk_by(|a, b| owner(a) == owner(b))
-            .flat_map(|run| {
-                let owner = owner(&run[0]);
-                let places: Vec<_> = run
-                    .iter()
-                    .map(|p| (p.triangle - firsts[owner], p.barycentric))
-                    .collect();
-                probe.irradiance(
-                    gpu,
-                    &head.renderer,
-                    &head.camera,
-                    skin[owner],
-                    mm_per_unit,
-                    &places,
-                )
-            });
+        let runs = places.chunk_by(|a, b| owner(a) == owner(b)).flat_map(|run| {
+            let owner = owner(&run[0]);
+            let places: Vec<_> = run.iter().map(|p| (p.triangle - firsts[owner], p.barycentric)).collect();
+            probe.irradiance(gpu, &head.renderer, &head.camera, skin[owner], mm_per_unit, &places)
+        });
         Ok(runs.collect())
     };
-    let mesh = Triangles {
-        vertices_mm: &points,
-        indices: &indices,
-    };
+    let mesh = Triangles { vertices_mm: &points, indices: &indices };
     let Ok(integral) = surface_integral(mesh, asked, profile, density, light, progress);
     integral
 }
@@ -220,11 +183,7 @@ fn key(model: &Model, scene: &Scene, profile: &Profile) -> u64 {
     hash_model(model, &mut hasher);
     format!("{profile:?} {}", scene.mm_per_unit).hash(&mut hasher);
     for p in &scene.pixels {
-        let Patch {
-            point_mm,
-            area_mm2,
-            irradiance,
-        } = p.patch;
+        let Patch { point_mm, area_mm2, irradiance } = p.patch;
         area_mm2.to_bits().hash(&mut hasher);
         let [x, y] = p.steps_mm;
         for v in [point_mm, irradiance, x, y] {
@@ -255,16 +214,7 @@ mod tests {
             let asked: Vec<Patch> = scene.pixels.iter().map(|p| p.patch).collect();
             let of = |density| {
                 let none = |_| ();
-                eq7(
-                    &gpu,
-                    &model,
-                    head,
-                    1000.0,
-                    &asked,
-                    &Profile::SKIN,
-                    density,
-                    &none,
-                )
+                eq7(&gpu, &model, head, 1000.0, &asked, &Profile::SKIN, density, &none)
             };
             let (whole, half) = (of(1.0), of(0.5));
             let worst = |a: &[Vec3], b: &[Vec3]| {
@@ -278,10 +228,7 @@ mod tests {
                 "{view}: {} and {} samples, at most {printed:.5} as printed, {normalised:.5} normalised",
                 whole.samples, half.samples,
             );
-            assert!(
-                printed <= 0.001 && normalised <= 0.001,
-                "{view}: {printed}, {normalised}"
-            );
+            assert!(printed <= 0.001 && normalised <= 0.001, "{view}: {printed}, {normalised}");
         }
     }
 
@@ -292,8 +239,7 @@ mod tests {
         let cache = std::env::temp_dir().join(format!("truths-{}", std::process::id()));
         let scene = |name| Scene::new(&gpu, &model, 1000.0, name, [[32; 2]; 2], 1).unwrap();
         let bar = ProgressBar::hidden();
-        let truths =
-            |scene: &Scene| Truths::of(&gpu, &model, scene, &Profile::SKIN, &cache, &bar).unwrap();
+        let truths = |scene: &Scene| Truths::of(&gpu, &model, scene, &Profile::SKIN, &cache, &bar).unwrap();
         let count = || std::fs::read_dir(&cache).unwrap().count();
         let first = truths(&scene("sphere"));
         assert_eq!(count(), 1);

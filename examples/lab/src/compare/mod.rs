@@ -105,13 +105,8 @@ fn options() -> Result<Option<Options>, Error> {
         out: "out/compare".into(),
     };
     let mut parser = lexopt::Parser::from_env();
-    let refused = |e: lexopt::Error| {
-        Error::new(
-            "command line",
-            format!("\"{e}\""),
-            "options as --help lists them",
-        )
-    };
+    let refused =
+        |e: lexopt::Error| Error::new("command line", format!("\"{e}\""), "options as --help lists them");
     while let Some(arg) = parser.next().map_err(refused)? {
         let Long(name) = &arg else {
             if let Short('h') = arg {
@@ -125,9 +120,8 @@ fn options() -> Result<Option<Options>, Error> {
             print!("{HELP}");
             return Ok(None);
         }
-        let mut text = || -> Result<String, Error> {
-            parser.value().and_then(|v| v.string()).map_err(refused)
-        };
+        let mut text =
+            || -> Result<String, Error> { parser.value().and_then(|v| v.string()).map_err(refused) };
         match name.as_str() {
             "model" => options.model = Some(text()?.into()),
             "out" => options.out = text()?.into(),
@@ -153,9 +147,7 @@ fn options() -> Result<Option<Options>, Error> {
                     .map_err(|_| Error::new("--texture-size", text, "a whole number of texels"))?;
             }
             _ => {
-                return Err(refused(lexopt::Error::UnexpectedOption(format!(
-                    "--{name}"
-                ))));
+                return Err(refused(lexopt::Error::UnexpectedOption(format!("--{name}"))));
             }
         }
     }
@@ -232,9 +224,8 @@ struct Shot {
 
 fn compare(options: &Options) -> Result<(), Error> {
     let started = Instant::now();
-    let progress = ProgressBar::new(5).with_style(
-        ProgressStyle::with_template("{bar:24} {msg}").expect("the template is a constant"),
-    );
+    let progress = ProgressBar::new(5)
+        .with_style(ProgressStyle::with_template("{bar:24} {msg}").expect("the template is a constant"));
     let step = |message: &str| {
         progress.inc(1);
         progress.set_message(message.to_owned());
@@ -263,27 +254,18 @@ fn compare(options: &Options) -> Result<(), Error> {
     step("measuring");
     let frame = Skin::read(&gpu, &shot);
     let mm_per_texel = mm_per_texel(&scene, options);
-    let finest = mm_per_texel
-        .iter()
-        .map(|(_, mm)| *mm)
-        .fold(f32::INFINITY, f32::min);
+    let finest = mm_per_texel.iter().map(|(_, mm)| *mm).fold(f32::INFINITY, f32::min);
     let coarsest = mm_per_texel.iter().map(|(_, mm)| *mm).fold(0.0, f32::max);
     let measured = measure(&gpu, &shot, fine.as_ref(), &frame, options.exposure);
-    let runs: Vec<_> = shot
-        .modes
-        .iter()
-        .filter(|m| m.runs > 0)
-        .map(|m| format!("{} of {}", m.title, m.runs))
-        .collect();
+    let runs: Vec<_> =
+        shot.modes.iter().filter(|m| m.runs > 0).map(|m| format!("{} of {}", m.title, m.runs)).collect();
     let mut notes = vec![format!(
         "Timings are medians of runs, submit and wait ({}); on a software driver they compare \
          the modes with each other, not with a GPU.",
         runs.join(", ")
     )];
     if fine.is_none() {
-        notes.push(
-            "Pictures of this size are not anti-aliased: the device cannot render twice it.".into(),
-        );
+        notes.push("Pictures of this size are not anti-aliased: the device cannot render twice it.".into());
     }
     if finest < coarsest {
         notes.push(format!(
@@ -295,10 +277,7 @@ fn compare(options: &Options) -> Result<(), Error> {
         adapter: gpu.adapter.clone(),
         size: options.size,
         model,
-        attribution: options
-            .model
-            .is_none()
-            .then(|| "MakeHuman base mesh and targets, CC0 1.0".into()),
+        attribution: options.model.is_none().then(|| "MakeHuman base mesh and targets, CC0 1.0".into()),
         view: options.view_name.clone(),
         skin_pixels: frame.skin.iter().filter(|skin| **skin).count(),
         mm_per_px: f64::from(options.mm_per_unit / shot.camera.px_per_unit(options.size)),
@@ -318,20 +297,11 @@ fn compare(options: &Options) -> Result<(), Error> {
     step("writing the report");
     let files = files(&report, &measured.layers)
         .map_err(|e| Error::new("report", format!("\"{e}\""), "pictures that can be encoded"))?;
-    output::write(&options.out, &files).map_err(|e| {
-        Error::new(
-            "--out",
-            format!("\"{e}\""),
-            "a directory that can be written to",
-        )
-    })?;
+    output::write(&options.out, &files)
+        .map_err(|e| Error::new("--out", format!("\"{e}\""), "a directory that can be written to"))?;
     progress.finish_and_clear();
     println!("{}", report::table(&report));
-    println!(
-        "{} in {:.1} s",
-        options.out.join("report.html").display(),
-        started.elapsed().as_secs_f64()
-    );
+    println!("{} in {:.1} s", options.out.join("report.html").display(), started.elapsed().as_secs_f64());
     Ok(())
 }
 
@@ -350,10 +320,7 @@ impl Shot {
             None => Camera::framing(scene, options.view, size),
         }
         .turned(options.turn_degrees.to_radians());
-        let lighting = Lighting {
-            specular: options.specular,
-            ..Default::default()
-        };
+        let lighting = Lighting { specular: options.specular, ..Default::default() };
         renderer.render(gpu, &camera, &lighting, options.mm_per_unit)?;
         let none = Scattered {
             name: "none",
@@ -363,24 +330,15 @@ impl Shot {
             ms: 0.0,
             atlas_ms: None,
         };
-        let mut shot = Self {
-            size,
-            renderer,
-            camera,
-            modes: vec![none],
-            unavailable: Vec::new(),
-        };
+        let mut shot = Self { size, renderer, camera, modes: vec![none], unavailable: Vec::new() };
         match shot.texture_space(gpu, options, most_runs) {
             Ok(mode) => shot.modes.push(mode),
-            Err(error) => shot
-                .unavailable
-                .push(("texture space".into(), error.to_string())),
+            Err(error) => shot.unavailable.push(("texture space".into(), error.to_string())),
         }
         let title = format!("screen space, a plan at {}", fraction(options.max_error));
         match Plan::new(&[options.profile], options.max_error) {
             Ok(plan) => {
-                let mode =
-                    shot.screen_space(gpu, options, "screen_planned", title, &plan, most_runs)?;
+                let mode = shot.screen_space(gpu, options, "screen_planned", title, &plan, most_runs)?;
                 shot.modes.push(mode);
             }
             Err(error) => shot.unavailable.push((title, error.to_string())),
@@ -423,12 +381,7 @@ impl Shot {
     }
 
     /// Fails only where the model has no UVs for it.
-    fn texture_space(
-        &self,
-        gpu: &Gpu,
-        options: &Options,
-        most_runs: usize,
-    ) -> Result<Scattered, Error> {
+    fn texture_space(&self, gpu: &Gpu, options: &Options, most_runs: usize) -> Result<Scattered, Error> {
         let renderer = &self.renderer;
         let atlas = AtlasRenderer::new(gpu, renderer, options.texture_size)?;
         let output = renderer.scattered_target(gpu);
@@ -444,8 +397,7 @@ impl Shot {
                 blur_ms += start.elapsed().as_secs_f64() * 1e3;
                 Ok(())
             };
-            let raster_ms =
-                atlas.render(gpu, renderer, 1, options.mm_per_unit, &output, scatter)?;
+            let raster_ms = atlas.render(gpu, renderer, 1, options.mm_per_unit, &output, scatter)?;
             raster.push(raster_ms);
             blur.push(blur_ms);
             both.push(raster_ms + blur_ms);
@@ -504,11 +456,7 @@ impl Skin {
             .enumerate()
             .map(|(i, (depth, normal))| area(i, *depth, normal, inverse, shot.size))
             .collect();
-        let albedo = gpu
-            .read(&g.albedo)
-            .iter()
-            .map(|p| Vec4::from(*p).truncate())
-            .collect();
+        let albedo = gpu.read(&g.albedo).iter().map(|p| Vec4::from(*p).truncate()).collect();
         Self { skin, area, albedo }
     }
 }
@@ -547,10 +495,7 @@ fn unresolved(mm_per_texel: &[(String, f32)], profile: &Profile) -> Vec<String> 
         for g in profile.gaussians() {
             let sigma_mm = g.variance_mm2.sqrt();
             if sigma_mm < RESOLVED_TEXELS * mm {
-                found.push(format!(
-                    "σ {sigma_mm:.3} mm is {:.2} texels on {name}",
-                    sigma_mm / mm
-                ));
+                found.push(format!("σ {sigma_mm:.3} mm is {:.2} texels on {name}", sigma_mm / mm));
             }
         }
     }
@@ -566,17 +511,8 @@ struct Measured {
 fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: f32) -> Measured {
     let [width, height] = shot.size;
     let modes = &shot.modes;
-    let layer = |pixels: Vec<[f32; 3]>| Layer {
-        width,
-        height,
-        pixels,
-    };
-    let light = |m: &Scattered| {
-        gpu.read(&m.view)
-            .iter()
-            .map(|p| [p[0], p[1], p[2]])
-            .collect()
-    };
+    let layer = |pixels: Vec<[f32; 3]>| Layer { width, height, pixels };
+    let light = |m: &Scattered| gpu.read(&m.view).iter().map(|p| [p[0], p[1], p[2]]).collect();
     let irradiance: Vec<Layer> = modes.iter().map(|m| layer(light(m))).collect();
     let radiance: Vec<Layer> = irradiance
         .iter()
@@ -596,9 +532,7 @@ fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: 
         Some(fine) => srgb::halved(&picture(fine, i, shown)),
         None => picture(shot, i, shown),
     };
-    let pictures: Vec<_> = (0..modes.len())
-        .map(|i| picture(shot, i, Shown::Picture))
-        .collect();
+    let pictures: Vec<_> = (0..modes.len()).map(|i| picture(shot, i, Shown::Picture)).collect();
 
     // The rim of a silhouette is left out: there a pixel's E is as much of the edge as of the skin.
     let inner = metrics::erode(&frame.skin, width, height, 2);
@@ -607,9 +541,7 @@ fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: 
         let pairs = irradiance[r].pixels.iter().zip(&irradiance[0].pixels);
         pairs
             .zip(&inner)
-            .map(|((a, b), inner)| {
-                *inner && (Vec3::from(*a) - Vec3::from(*b)).abs().max_element() > 0.01
-            })
+            .map(|((a, b), inner)| *inner && (Vec3::from(*a) - Vec3::from(*b)).abs().max_element() > 0.01)
             .collect::<Vec<_>>()
     });
     let energy = |e: &Layer| -> f64 {
@@ -634,11 +566,9 @@ fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: 
             rel_rmse_scattered: reference
                 .zip(scattered.as_ref())
                 .and_then(|(r, mask)| metrics::relative_rmse(&irradiance[i], &irradiance[r], mask)),
-            max_error: reference
-                .and_then(|r| metrics::max_error(&irradiance[i], &irradiance[r], &inner)),
-            delta_e2000_p99: reference.and_then(|r| {
-                metrics::delta_e2000_percentile(&radiance[i], &radiance[r], &inner, 0.99)
-            }),
+            max_error: reference.and_then(|r| metrics::max_error(&irradiance[i], &irradiance[r], &inner)),
+            delta_e2000_p99: reference
+                .and_then(|r| metrics::delta_e2000_percentile(&radiance[i], &radiance[r], &inner, 0.99)),
             flip_mean: flip.as_ref().and_then(|(mean, _)| *mean),
             energy_ratio: Some(energy(&irradiance[i]) / energy(&irradiance[0]))
                 .filter(|ratio| ratio.is_finite()),
@@ -650,16 +580,10 @@ fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: 
         });
     }
     let names = modes.iter().map(|m| m.name);
-    Measured {
-        reports,
-        layers: names.zip(irradiance).collect(),
-    }
+    Measured { reports, layers: names.zip(irradiance).collect() }
 }
 
-fn files(
-    report: &Report,
-    layers: &[(&'static str, Layer)],
-) -> image::ImageResult<Vec<(String, Vec<u8>)>> {
+fn files(report: &Report, layers: &[(&'static str, Layer)]) -> image::ImageResult<Vec<(String, Vec<u8>)>> {
     let mut files = Vec::new();
     for mode in &report.modes {
         let pictures = [

@@ -260,11 +260,8 @@ pub fn json(report: &Report) -> String {
             .map(|(figure, value)| (figure.key.to_string(), json!(value)))
             .collect()
     };
-    let modes: Map<String, Value> = report
-        .modes
-        .iter()
-        .map(|mode| (mode.name.to_string(), figures(mode).into()))
-        .collect();
+    let modes: Map<String, Value> =
+        report.modes.iter().map(|mode| (mode.name.to_string(), figures(mode).into())).collect();
     let report = json!({
         "adapter": report.adapter,
         "size": report.size,
@@ -289,25 +286,13 @@ pub fn json(report: &Report) -> String {
 pub fn table(report: &Report) -> String {
     let mut text = String::new();
     let facts = facts(report);
-    let width = facts
-        .iter()
-        .map(|(name, _)| name.chars().count())
-        .max()
-        .unwrap_or(0);
+    let width = facts.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
     for (name, fact) in facts {
         line(&mut text, &format!("{name:<width$}  {fact}"));
     }
 
-    let name_width = FIGURES
-        .iter()
-        .map(|f| indented(f).chars().count())
-        .max()
-        .unwrap_or(0);
-    let unit_width = FIGURES
-        .iter()
-        .map(|f| f.unit.chars().count())
-        .max()
-        .unwrap_or(0);
+    let name_width = FIGURES.iter().map(|f| indented(f).chars().count()).max().unwrap_or(0);
+    let unit_width = FIGURES.iter().map(|f| f.unit.chars().count()).max().unwrap_or(0);
     let row = |name: &str, unit: &str, cell: &dyn Fn(&ModeReport) -> String| {
         let mut row = format!("{name:<name_width$}  {unit:<unit_width$}");
         for mode in &report.modes {
@@ -319,10 +304,7 @@ pub fn table(report: &Report) -> String {
     line(&mut text, "");
     line(&mut text, &row("", "", &|mode| mode.title.clone()));
     for figure in shown(report) {
-        line(
-            &mut text,
-            &row(&indented(figure), figure.unit, &|mode| figure.text(mode)),
-        );
+        line(&mut text, &row(&indented(figure), figure.unit, &|mode| figure.text(mode)));
     }
 
     line(&mut text, "");
@@ -342,10 +324,7 @@ pub fn html(report: &Report) -> ImageResult<String> {
     let mut page = head(&title, STYLE);
     line(&mut page, "<h1>Skin with and without scattering</h1>");
     if let Some(headline) = headline(report) {
-        line(
-            &mut page,
-            &format!("<p class=lead>{}</p>", escape(&headline)),
-        );
+        line(&mut page, &format!("<p class=lead>{}</p>", escape(&headline)));
     }
     for note in notes(report) {
         line(&mut page, &format!("<p class=note>{}</p>", escape(&note)));
@@ -353,12 +332,7 @@ pub fn html(report: &Report) -> ImageResult<String> {
     // A view that some mode lacks could not be compared.
     let views: Vec<&View> = VIEWS
         .iter()
-        .filter(|view| {
-            report
-                .modes
-                .iter()
-                .all(|mode| (view.picture)(mode).is_some())
-        })
+        .filter(|view| report.modes.iter().all(|mode| (view.picture)(mode).is_some()))
         .collect();
     if report.modes.len() > 1 {
         slider(&mut page, report, &views);
@@ -367,15 +341,9 @@ pub fn html(report: &Report) -> ImageResult<String> {
     pictures(&mut page, report, &views)?;
     line(&mut page, "<h2>What was compared</h2>\n<dl>");
     for (name, fact) in facts(report) {
-        line(
-            &mut page,
-            &format!("<dt>{name}</dt><dd>{}</dd>", escape(&fact)),
-        );
+        line(&mut page, &format!("<dt>{name}</dt><dd>{}</dd>", escape(&fact)));
     }
-    line(
-        &mut page,
-        &format!("</dl>\n</main>\n<script>{SCRIPT}</script>\n</html>"),
-    );
+    line(&mut page, &format!("</dl>\n</main>\n<script>{SCRIPT}</script>\n</html>"));
     Ok(page)
 }
 
@@ -389,19 +357,11 @@ fn slider(page: &mut String, report: &Report, views: &[&View]) {
         }
         select + "</select></label>"
     };
-    let modes: Vec<_> = report
-        .modes
-        .iter()
-        .map(|mode| (mode.name, mode.title.as_str()))
-        .collect();
+    let modes: Vec<_> = report.modes.iter().map(|mode| (mode.name, mode.title.as_str())).collect();
     let layers: Vec<_> = views.iter().map(|view| (view.name, view.title)).collect();
     let [width, height] = report.size;
     let is_plan = |mode: &ModeReport| mode.name == "screen_planned";
-    let recommended = report
-        .modes
-        .iter()
-        .position(is_plan)
-        .unwrap_or(modes.len() - 1);
+    let recommended = report.modes.iter().position(is_plan).unwrap_or(modes.len() - 1);
     let controls = [
         select("left", "Left", 0, &modes),
         select("layer", "Show", 0, &layers),
@@ -435,9 +395,7 @@ fn figures(page: &mut String, report: &Report) {
         let (name, unit, meaning) = (figure.name, figure.unit, figure.meaning);
         line(
             page,
-            &format!(
-                "<tr{part}><th scope=row>{name} <span>{unit}</span><small>{meaning}</small></th>"
-            ),
+            &format!("<tr{part}><th scope=row>{name} <span>{unit}</span><small>{meaning}</small></th>"),
         );
         for mode in &report.modes {
             line(page, &format!("<td>{}</td>", figure.text(mode)));
@@ -451,16 +409,9 @@ fn figures(page: &mut String, report: &Report) {
 fn pictures(page: &mut String, report: &Report, views: &[&View]) -> ImageResult<()> {
     line(page, "<h2>Pictures</h2>");
     for view in views {
-        let scale = if view.name == "flip" {
-            " 0 <i class=magma></i> 1"
-        } else {
-            ""
-        };
+        let scale = if view.name == "flip" { " 0 <i class=magma></i> 1" } else { "" };
         let (title, meaning) = (view.title, view.meaning);
-        line(
-            page,
-            &format!("<h3>{title}</h3>\n<p>{meaning}{scale}</p>\n<div class=\"mat strip\">"),
-        );
+        line(page, &format!("<h3>{title}</h3>\n<p>{meaning}{scale}</p>\n<div class=\"mat strip\">"));
         for mode in &report.modes {
             let Some(picture) = (view.picture)(mode) else {
                 continue;
@@ -483,9 +434,9 @@ fn pictures(page: &mut String, report: &Report, views: &[&View]) -> ImageResult<
 
 /// The figures for people: all but the optional ones that no mode has.
 fn shown(report: &Report) -> impl Iterator<Item = &'static Figure> {
-    FIGURES.iter().filter(|figure| {
-        !figure.optional || report.modes.iter().any(|mode| figure.value(mode).is_some())
-    })
+    FIGURES
+        .iter()
+        .filter(|figure| !figure.optional || report.modes.iter().any(|mode| figure.value(mode).is_some()))
 }
 
 /// The result in two sentences, where there is one.
@@ -504,10 +455,7 @@ fn headline(report: &Report) -> Option<String> {
 
 /// The modes that are missing, then the notes.
 fn notes(report: &Report) -> Vec<String> {
-    let missing = report
-        .unavailable
-        .iter()
-        .map(|(mode, reason)| format!("No {mode}: {reason}"));
+    let missing = report.unavailable.iter().map(|(mode, reason)| format!("No {mode}: {reason}"));
     missing.chain(report.notes.iter().cloned()).collect()
 }
 
@@ -515,12 +463,7 @@ fn notes(report: &Report) -> Vec<String> {
 fn facts(report: &Report) -> Vec<(&'static str, String)> {
     let [width, height] = report.size;
     let mut facts = vec![("Model", report.model.clone())];
-    facts.extend(
-        report
-            .attribution
-            .iter()
-            .map(|names| ("Attribution", names.clone())),
-    );
+    facts.extend(report.attribution.iter().map(|names| ("Attribution", names.clone())));
     facts.push(("View", report.view.clone()));
     facts.push((
         "Picture",
@@ -530,23 +473,9 @@ fn facts(report: &Report) -> Vec<(&'static str, String)> {
         ),
     ));
     let atlas = report.texture_size;
-    facts.push((
-        "Atlas",
-        format!(
-            "{atlas} × {atlas} texels, {:.3} mm per texel",
-            report.mm_per_texel
-        ),
-    ));
-    facts.extend(
-        report
-            .unresolved
-            .iter()
-            .map(|gaussian| ("Unresolved", gaussian.clone())),
-    );
-    facts.push((
-        "FLIP",
-        format!("at {PIXELS_PER_DEGREE} pixels per degree of visual angle"),
-    ));
+    facts.push(("Atlas", format!("{atlas} × {atlas} texels, {:.3} mm per texel", report.mm_per_texel)));
+    facts.extend(report.unresolved.iter().map(|gaussian| ("Unresolved", gaussian.clone())));
+    facts.push(("FLIP", format!("at {PIXELS_PER_DEGREE} pixels per degree of visual angle")));
     facts.push(("Adapter", report.adapter.clone()));
     facts.push(("Command", report.command.clone()));
     facts
@@ -562,11 +491,8 @@ fn indented(figure: &Figure) -> String {
 /// A layer without pixels, or with another number of them than its size says.
 pub fn exr(layer: &Layer) -> ImageResult<Vec<u8>> {
     let floats = layer.pixels.as_flattened().to_vec();
-    let mismatch = || {
-        ImageError::Parameter(ParameterError::from_kind(
-            ParameterErrorKind::DimensionMismatch,
-        ))
-    };
+    let mismatch =
+        || ImageError::Parameter(ParameterError::from_kind(ParameterErrorKind::DimensionMismatch));
     let image = Rgb32FImage::from_raw(layer.width, layer.height, floats).ok_or_else(mismatch)?;
     let mut file = Cursor::new(Vec::new());
     image.write_to(&mut file, ImageFormat::OpenExr)?;
@@ -721,11 +647,7 @@ mod tests {
                 assert!(mode[figure.key].is_number(), "{name} {}", figure.key);
             }
             for part in ["ms_raster", "ms_blur"] {
-                assert_eq!(
-                    mode.contains_key(part),
-                    name == "texture_space",
-                    "{name} {part}"
-                );
+                assert_eq!(mode.contains_key(part), name == "texture_space", "{name} {part}");
             }
         }
         assert_eq!(json["modes"]["screen_space"]["rel_rmse_vs_texture"], 0.02);
@@ -737,11 +659,7 @@ mod tests {
         report.modes[1].energy_ratio = Some(f64::NAN);
         let json: Value = serde_json::from_str(&json(&report)).unwrap();
         assert!(json["modes"].get("texture_space").is_none());
-        for key in [
-            "rel_rmse_vs_texture",
-            "flip_mean_vs_texture",
-            "energy_ratio",
-        ] {
+        for key in ["rel_rmse_vs_texture", "flip_mean_vs_texture", "energy_ratio"] {
             assert!(json["modes"]["screen_space"][key].is_null(), "{key}");
         }
         assert_eq!(json["notes"][0], "No Texture space: the mesh has no UVs.");
@@ -754,11 +672,7 @@ mod tests {
         assert!(!html.contains("http:") && !html.contains("https:") && !html.contains("url("));
         for mode in &report.modes {
             let address = address(&mode.picture).unwrap();
-            assert!(
-                html.contains(&format!("src=\"{address}\"")),
-                "{}",
-                mode.name
-            );
+            assert!(html.contains(&format!("src=\"{address}\"")), "{}", mode.name);
         }
         // Every picture is there once: four modes, four views. The slider opens on what is recommended.
         assert_eq!(html.matches("data:image/png").count(), 16);
@@ -796,14 +710,8 @@ mod tests {
 
     #[test]
     fn layers_survive_their_files() {
-        let layer = Layer {
-            width: 2,
-            height: 1,
-            pixels: vec![[0.1, 2.5, -0.3], [1e-6, 0.0, 4.0]],
-        };
-        let read = image::load_from_memory(&exr(&layer).unwrap())
-            .unwrap()
-            .into_rgb32f();
+        let layer = Layer { width: 2, height: 1, pixels: vec![[0.1, 2.5, -0.3], [1e-6, 0.0, 4.0]] };
+        let read = image::load_from_memory(&exr(&layer).unwrap()).unwrap().into_rgb32f();
         assert_eq!(read.as_raw(), layer.pixels.as_flattened());
         assert!(exr(&Layer { width: 3, ..layer }).is_err());
     }

@@ -72,11 +72,7 @@ pub fn read(path: &Path, layer: Option<&str>, size: [u32; 2], one: bool) -> Resu
             Some(layer) => format!("{what} in a layer called {layer}"),
             None => format!("{what}; \"layer\" in gbuffer.json picks one of several"),
         };
-        return Err(Error::new(
-            format!("{input}: channels"),
-            names.join(", "),
-            needs,
-        ));
+        return Err(Error::new(format!("{input}: channels"), names.join(", "), needs));
     };
     Ok(Pixels {
         rgb: decode(reader, picked).map_err(bad_exr)?,
@@ -115,12 +111,7 @@ fn channels(headers: &[Header]) -> Vec<Channel> {
                 name.insert_str(0, &prefix);
             }
             let sample = channel.sample_type;
-            channels.push(Channel {
-                part,
-                index,
-                name,
-                sample,
-            });
+            channels.push(Channel { part, index, name, sample });
         }
     }
     channels
@@ -146,17 +137,11 @@ fn pick<'a>(channels: &[&'a Channel], one: bool) -> Option<[&'a Channel; 3]> {
 }
 
 /// Three channels of one part, over the display window.
-fn decode(
-    reader: Reader<BufReader<File>>,
-    picked: [&Channel; 3],
-) -> exr::error::Result<Vec<[f32; 3]>> {
+fn decode(reader: Reader<BufReader<File>>, picked: [&Channel; 3]) -> exr::error::Result<Vec<[f32; 3]>> {
     let part = picked[0].part;
     let header = &reader.headers()[part];
     // The data window may be smaller or larger than the display window, and elsewhere.
-    let (display, data) = (
-        header.shared_attributes.display_window,
-        header.own_attributes.layer_position,
-    );
+    let (display, data) = (header.shared_attributes.display_window, header.own_attributes.layer_position);
     let Vec2(width, height) = display.size;
     let place = move |Vec2(x, y): Vec2<usize>| {
         let shifted = |at, from: i32, to: i32| at as i64 + i64::from(from) - i64::from(to);
@@ -184,9 +169,7 @@ fn decode(
         Ok(())
     };
     reader
-        .filter_chunks(false, |_, tile, block| {
-            block.layer == part && tile.is_largest_resolution_level()
-        })?
+        .filter_chunks(false, |_, tile, block| block.layer == part && tile.is_largest_resolution_level())?
         .decompress_sequential(false, put)?;
     Ok(pixels)
 }

@@ -80,11 +80,7 @@ impl TryFrom<Source> for Layers {
             Source::Sum(layers) if layers.is_empty() => return Err("an empty list of files"),
             Source::Sum(layers) => layers.into_iter().flat_map(|l| l.0).collect(),
             Source::Layer(layer) => vec![layer],
-            Source::File(file) => vec![Layer {
-                file,
-                layer: None,
-                unknown: Unknown::new(),
-            }],
+            Source::File(file) => vec![Layer { file, layer: None, unknown: Unknown::new() }],
         }))
     }
 }
@@ -156,12 +152,7 @@ impl Camera {
         let differ = |&[r, g, b]: &[f32; 3]| (r != g || g != b) && (r + g + b).is_finite();
         if let Some(at) = rgb.iter().position(differ) {
             let got = format!("{:?}", rgb[at]);
-            return Err(self.bad_pixel(
-                &path,
-                at,
-                &got,
-                "one channel, or R, G and B that are equal",
-            ));
+            return Err(self.bad_pixel(&path, at, &got, "one channel, or R, G and B that are equal"));
         }
         let of = |&[r, g, b]: &[f32; 3]| if r == g && g == b { r } else { r + g + b };
         Ok((path, rgb.iter().map(of).collect(), is_half))
@@ -241,14 +232,7 @@ impl Dump {
                 return Err(camera.bad_pixel(&depth_path, at, distance, needs));
             }
         }
-        Ok(Self {
-            camera,
-            irradiance,
-            depth,
-            profile_id,
-            depth_is_half,
-            depth_error_mm,
-        })
+        Ok(Self { camera, irradiance, depth, profile_id, depth_is_half, depth_error_mm })
     }
 
     /// The largest irradiance of a pixel that scatters.

@@ -91,10 +91,7 @@ impl Case {
             let values = (0..width * height).map(|i| value(i, c));
             AnyChannel::new(*name, samples(values.collect()))
         });
-        let attributes = LayerAttributes {
-            layer_name: part.map(Text::from),
-            ..Default::default()
-        };
+        let attributes = LayerAttributes { layer_name: part.map(Text::from), ..Default::default() };
         let channels = AnyChannels::sort(channels.collect());
         let encoding = Encoding::SMALL_LOSSLESS;
         Layer::new((width, height), attributes, encoding, channels)
@@ -108,13 +105,7 @@ impl Case {
         image.write().non_parallel().to_file(self.at(file)).unwrap();
     }
 
-    pub fn write(
-        &self,
-        file: &str,
-        names: &[&str],
-        samples: Samples,
-        value: impl Fn(usize, usize) -> f32,
-    ) {
+    pub fn write(&self, file: &str, names: &[&str], samples: Samples, value: impl Fn(usize, usize) -> f32) {
         self.write_layers(file, vec![self.layer(None, names, samples, value)]);
     }
 

@@ -64,14 +64,13 @@ fn filter(options: &Options) -> Result<(), Error> {
 
     let plan = match options.max_error {
         None => Plan::exact(&options.profiles)?,
-        Some(max_error) => Plan::new(&options.profiles, max_error)
-            .map_err(|e| Error::from(e).within("--max-error"))?,
+        Some(max_error) => {
+            Plan::new(&options.profiles, max_error).map_err(|e| Error::from(e).within("--max-error"))?
+        }
     };
     let brightest = dump.brightest();
     if brightest > LARGEST_HALF && !plan.is_exact() {
-        note(&format!(
-            "irradiance of {brightest} is held at {LARGEST_HALF}; scale it, or use --exact"
-        ));
+        note(&format!("irradiance of {brightest} is held at {LARGEST_HALF}; scale it, or use --exact"));
     }
     let scattered = scatter(&gpu, &dump, &plan)?;
     write(options, dump.camera.size(), scattered)?;

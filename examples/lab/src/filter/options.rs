@@ -123,10 +123,9 @@ fn profile(name: &str) -> Result<Profile, Error> {
 }
 
 fn scaled(profile: &Profile, variance_scale: f32) -> Result<Profile, Error> {
-    let gaussians = profile.gaussians().iter().map(|g| Gaussian {
-        variance_mm2: g.variance_mm2 * variance_scale,
-        ..*g
-    });
-    Profile::new(&gaussians.collect::<Vec<_>>())
-        .map_err(|e| Error::from(e).within("--variance-scale"))
+    let gaussians = profile
+        .gaussians()
+        .iter()
+        .map(|g| Gaussian { variance_mm2: g.variance_mm2 * variance_scale, ..*g });
+    Profile::new(&gaussians.collect::<Vec<_>>()).map_err(|e| Error::from(e).within("--variance-scale"))
 }

@@ -38,11 +38,7 @@ impl Head {
         let lighting = Lighting::default();
         renderer.render(&gpu, &camera, &lighting, 1000.0).unwrap();
         let projection = camera.projection(Self::SIZE);
-        Self {
-            gpu,
-            renderer,
-            projection,
-        }
+        Self { gpu, renderer, projection }
     }
 
     /// Leaves it as another program would.
@@ -181,10 +177,7 @@ fn what_does_not_scatter_comes_out_as_it_was() {
     case.write("light.exr", RGB, FLOATS, light);
     case.write("id.exr", &["V"], HALVES, |i, _| f32::from(is_skin(i)));
     let with_id: &[f32] = &[0.5, 1e9, 1e10, -1.0, f32::NAN];
-    for (id, backgrounds) in [
-        (json!("id.exr"), with_id),
-        (Value::Null, &[0.0, 1e10, f32::INFINITY]),
-    ] {
+    for (id, backgrounds) in [(json!("id.exr"), with_id), (Value::Null, &[0.0, 1e10, f32::INFINITY])] {
         case.edit("/files/profile_id", id);
         for background in backgrounds {
             let depth = |i, _| if is_skin(i) { 0.5 } else { *background };
@@ -318,10 +311,7 @@ fn depth_survives_its_rounding() {
         let errors = distances.map(|z| write_depth(projection, z).unwrap().1 / f64::from(z));
         errors.fold(0.0, f64::max)
     };
-    let projections = [
-        perspective_infinite_reverse(0.4, 1.0, 0.01),
-        perspective(0.4, 1.0, 0.1, 100.0),
-    ];
+    let projections = [perspective_infinite_reverse(0.4, 1.0, 0.01), perspective(0.4, 1.0, 0.1, 100.0)];
     for (from, to) in [(0.1, 1.0), (1.0, 10.0), (10.0, 100.0)] {
         let [reversed, forward] = projections.map(|p| worst(p, from, to));
         println!("{from} to {to} units: reversed {reversed:.1e}, forward {forward:.1e}");

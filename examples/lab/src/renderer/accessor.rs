@@ -30,10 +30,7 @@ impl Buffers {
             return Err((format!("{shape:?} {kind:?}"), "a type glTF allows"));
         }
         if accessor.count() < count {
-            return Err((
-                format!("{} elements", accessor.count()),
-                "as many as are used",
-            ));
+            return Err((format!("{} elements", accessor.count()), "as many as are used"));
         }
         let most = match kind {
             _ if !accessor.normalized() => 1.0,
@@ -52,9 +49,8 @@ impl Buffers {
             DataType::F32 => f64::from(pod::<f32>(bytes)),
         };
         let (size, width) = (accessor.size(), kind.size());
-        let element = |bytes: &[u8]| {
-            std::array::from_fn(|i| convert(number(&bytes[width * i..][..width]) / most))
-        };
+        let element =
+            |bytes: &[u8]| std::array::from_fn(|i| convert(number(&bytes[width * i..][..width]) / most));
         let mut elements = match accessor.view() {
             Some(view) => {
                 let bytes = self.strided(&view, accessor.offset(), count, size)?;
@@ -72,10 +68,7 @@ impl Buffers {
             let at = self.strided(&places.view(), places.offset(), sparse.count(), width)?;
             let with = self.strided(&values.view(), values.offset(), sparse.count(), size)?;
             for (at, with) in at.zip(with) {
-                let at = at
-                    .iter()
-                    .rev()
-                    .fold(0, |at, &byte| at << 8 | usize::from(byte));
+                let at = at.iter().rev().fold(0, |at, &byte| at << 8 | usize::from(byte));
                 let slot = elements.get_mut(at);
                 *slot.ok_or((format!("a sparse element {at}"), "one that exists"))? = element(with);
             }

@@ -28,11 +28,7 @@ impl AtlasRenderer {
     pub fn new(gpu: &Gpu, renderer: &Renderer, size: u32) -> Result<Self, Error> {
         let limit = gpu.device.limits().max_texture_dimension_2d;
         if size == 0 || size > limit {
-            return Err(Error::new(
-                "texture size",
-                size.to_string(),
-                format!("1 to {limit}"),
-            ));
+            return Err(Error::new("texture size", size.to_string(), format!("1 to {limit}")));
         }
         let size = [size, size];
         let device = &gpu.device;
@@ -91,9 +87,7 @@ impl AtlasRenderer {
         let resample_shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("subsurface_lab::renderer resample"),
             source: wgpu::ShaderSource::Wgsl(
-                [include_str!("material.wgsl"), include_str!("resample.wgsl")]
-                    .concat()
-                    .into(),
+                [include_str!("material.wgsl"), include_str!("resample.wgsl")].concat().into(),
             ),
         });
         let resample = super::pipeline(
@@ -130,18 +124,12 @@ impl AtlasRenderer {
                     binding: 0,
                     resource: wgpu::BindingResource::TextureView(&scattered),
                 },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::Sampler(&sampler),
-                },
+                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(&sampler) },
             ],
         });
         Ok(Self {
             irradiance: target("subsurface_lab::renderer atlas irradiance", IRRADIANCE),
-            positions: target(
-                "subsurface_lab::renderer atlas positions",
-                TextureFormat::Rgba32Float,
-            ),
+            positions: target("subsurface_lab::renderer atlas positions", TextureFormat::Rgba32Float),
             scattered,
             light,
             resample,
@@ -191,11 +179,7 @@ impl AtlasRenderer {
                 gpu.run(|encoder| self.draw_atlas(encoder, renderer, mesh, page.clone()));
                 raster_ms += start.elapsed().as_secs_f64() * 1e3;
 
-                let atlas = Atlas {
-                    irradiance: &self.irradiance,
-                    positions: &self.positions,
-                    mm_per_unit,
-                };
+                let atlas = Atlas { irradiance: &self.irradiance, positions: &self.positions, mm_per_unit };
                 scatter(&atlas, &self.scattered)?;
 
                 gpu.run(|encoder| self.draw_screen(encoder, renderer, mesh, page.clone(), output));

@@ -39,10 +39,7 @@ impl Reader<'_> {
         label: &str,
     ) -> Result<Vec<[f32; N]>, Problem> {
         if accessor.count() != count {
-            return Err((
-                format!("{} of {label}", accessor.count()),
-                "as many as positions",
-            ));
+            return Err((format!("{} of {label}", accessor.count()), "as many as positions"));
         }
         let numbers = self.buffers.read(accessor, count, |x| x as f32);
         numbers.map_err(|(got, needs)| (format!("{label} of {got}"), needs))
@@ -55,16 +52,10 @@ impl Reader<'_> {
         from: &gltf::Primitive,
         mapping: &Mapping,
     ) -> Result<Attributes, Problem> {
-        let bytes = from
-            .get(&Semantic::Positions)
-            .and_then(|accessor| accessor.view());
+        let bytes = from.get(&Semantic::Positions).and_then(|accessor| accessor.view());
         if bytes.is_none() {
             let draco = from.extension_value("KHR_draco_mesh_compression").is_some();
-            let got = if draco {
-                "KHR_draco_mesh_compression"
-            } else {
-                "POSITION without bytes"
-            };
+            let got = if draco { "KHR_draco_mesh_compression" } else { "POSITION without bytes" };
             return Err((got.into(), "plain positions"));
         }
         let is_vec3 = |a: Accessor| a.dimensions() == Dimensions::Vec3;
@@ -89,11 +80,7 @@ impl Reader<'_> {
             rig: self.rig(node, from)?,
         };
         let weights = node.weights().or(mesh.weights()).unwrap_or_default();
-        for (target, &weight) in from
-            .morph_targets()
-            .zip(weights)
-            .filter(|(_, weight)| **weight != 0.0)
-        {
+        for (target, &weight) in from.morph_targets().zip(weights).filter(|(_, weight)| **weight != 0.0) {
             self.morph(&mut attributes.positions, target.positions(), weight)?;
             self.morph(&mut attributes.normals, target.normals(), weight)?;
             self.morph(&mut attributes.tangents, target.tangents(), weight)?;
@@ -112,9 +99,7 @@ impl Reader<'_> {
         };
         let moves: Vec<[f32; 3]> = self.numbers(&target, base.len(), "a morph target")?;
         for (to, by) in base.iter_mut().zip(moves) {
-            to.iter_mut()
-                .zip(by)
-                .for_each(|(to, by)| *to += weight * by);
+            to.iter_mut().zip(by).for_each(|(to, by)| *to += weight * by);
         }
         Ok(())
     }
@@ -128,8 +113,7 @@ impl Reader<'_> {
         let bind: Vec<[f32; 16]> = match skin.inverse_bind_matrices() {
             Some(accessor) => {
                 let matrices = self.buffers.read(&accessor, joints.len(), |x| x as f32);
-                matrices
-                    .map_err(|(got, needs)| (format!("inverse bind matrices of {got}"), needs))?
+                matrices.map_err(|(got, needs)| (format!("inverse bind matrices of {got}"), needs))?
             }
             None => vec![Mat4::IDENTITY.to_cols_array(); joints.len()],
         };
@@ -137,15 +121,12 @@ impl Reader<'_> {
             self.tree.worlds[joint.index()] * Mat4::from_cols_array(bind)
         };
         let matrices: Vec<Mat4> = joints.iter().zip(&bind).map(to_world).collect();
-        let name_of: HashMap<usize, &str> = joints
-            .iter()
-            .map(|j| (j.index(), j.name().unwrap_or_default()))
-            .collect();
+        let name_of: HashMap<usize, &str> =
+            joints.iter().map(|j| (j.index(), j.name().unwrap_or_default())).collect();
         // A joint of the head's, or one that hangs from it.
         let is_head = |joint: &gltf::Node| {
             let up = std::iter::successors(Some(joint.index()), |&i| self.tree.parents[i]);
-            up.map_while(|i| name_of.get(&i))
-                .any(|name| names::is_head(name))
+            up.map_while(|i| name_of.get(&i)).any(|name| names::is_head(name))
         };
         let is_head = joints.iter().map(is_head).collect();
         let mut shares = Vec::new();
@@ -156,23 +137,12 @@ impl Reader<'_> {
                 break;
             }
             let exists = 0.0..matrices.len() as f32;
-            if let Some(joint) = joints
-                .as_flattened()
-                .iter()
-                .find(|joint| !exists.contains(joint))
-            {
-                return Err((
-                    format!("joint {joint} of {}", matrices.len()),
-                    "existing joints",
-                ));
+            if let Some(joint) = joints.as_flattened().iter().find(|joint| !exists.contains(joint)) {
+                return Err((format!("joint {joint} of {}", matrices.len()), "existing joints"));
             }
             shares.push([joints, weights]);
         }
-        Ok(Some(Rig {
-            matrices,
-            is_head,
-            shares,
-        }))
+        Ok(Some(Rig { matrices, is_head, shares }))
     }
 }
 
@@ -193,11 +163,7 @@ impl Rig {
         for [joints, weights] in &self.shares {
             for (joint, weight) in joints[vertex].into_iter().zip(weights[vertex]) {
                 sum += self.matrices[joint as usize] * weight;
-                head += if self.is_head[joint as usize] {
-                    weight
-                } else {
-                    0.0
-                };
+                head += if self.is_head[joint as usize] { weight } else { 0.0 };
                 total += weight;
             }
         }
@@ -225,23 +191,12 @@ impl Attributes {
         triangles: &[[u32; 3]],
         world: Mat4,
     ) -> (Vec<Vertex>, Vec<u32>, Option<(Vec3, Vec3)>) {
-        let at = |i: usize| {
-            self.rig
-                .as_ref()
-                .and_then(|rig| rig.at(i))
-                .unwrap_or((world, 0.0))
-        };
+        let at = |i: usize| self.rig.as_ref().and_then(|rig| rig.at(i)).unwrap_or((world, 0.0));
         // The cofactors are the inverse transpose times the determinant, and exist without it.
         let cofactors = |m: Mat3| {
-            Mat3::from_cols(
-                m.y_axis.cross(m.z_axis),
-                m.z_axis.cross(m.x_axis),
-                m.x_axis.cross(m.y_axis),
-            )
+            Mat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
         };
-        let first = triangles
-            .first()
-            .map_or(world, |[first, ..]| at(*first as usize).0);
+        let first = triangles.first().map_or(world, |[first, ..]| at(*first as usize).0);
         let mirrored = first.determinant() < 0.0;
         let handedness = if mirrored { -1.0 } else { 1.0 };
         let vertex = |i: usize, world: Mat4| {
@@ -251,9 +206,7 @@ impl Attributes {
             let side = handedness * if tangent.w < 0.0 { -1.0 } else { 1.0 };
             let color = self.colors.get(i).copied().unwrap_or([1.0; 4]);
             Vertex {
-                position: world
-                    .transform_point3(element(&self.positions, i).into())
-                    .into(),
+                position: world.transform_point3(element(&self.positions, i).into()).into(),
                 normal: normal.normalize_or_zero().into(),
                 tangent: (linear * tangent.truncate()).extend(side).into(),
                 uv: element(&self.uvs, i),
@@ -276,11 +229,7 @@ impl Attributes {
                 }));
             }
         }
-        let head = around(
-            of_head
-                .into_iter()
-                .map(|i| Vec3::from(vertices[i].position)),
-        );
+        let head = around(of_head.into_iter().map(|i| Vec3::from(vertices[i].position)));
         (vertices, indices, head)
     }
 }

@@ -45,11 +45,7 @@ impl FromStr for View {
             "three-quarter" => Ok(Self::ThreeQuarter),
             "profile" => Ok(Self::Profile),
             "close-up" => Ok(Self::CloseUp),
-            _ => Err(Error::new(
-                "view",
-                name,
-                "front, three-quarter, profile or close-up",
-            )),
+            _ => Err(Error::new("view", name, "front, three-quarter, profile or close-up")),
         }
     }
 }
@@ -62,11 +58,7 @@ impl Camera {
         let extent = max - min;
         let bust = extent.x > 0.9 * extent.y;
         let head = if bust { 0.78 * extent.y } else { extent.y };
-        let middle = Vec3::new(
-            0.5 * (min.x + max.x),
-            max.y - 0.5 * head,
-            0.5 * (min.z + max.z),
-        );
+        let middle = Vec3::new(0.5 * (min.x + max.x), max.y - 0.5 * head, 0.5 * (min.z + max.z));
         let (target, height) = match view {
             View::CloseUp => (face.nose(scene, min.y + 0.35 * extent.y), 0.26 * extent.y),
             _ => (middle, head),
@@ -101,11 +93,7 @@ impl Camera {
             View::CloseUp => 20.0,
         };
         let back = Quat::from_rotation_y(yaw.to_radians()) * forward;
-        Self {
-            eye: target + distance * back,
-            target,
-            fov_y: FOV_Y,
-        }
+        Self { eye: target + distance * back, target, fov_y: FOV_Y }
     }
 
     /// World to view space: right-handed, looking down −Z.

@@ -41,9 +41,8 @@ impl Gpu {
                     "a Vulkan, Metal or DirectX 12 driver; on Linux ./setup installs one",
                 )
             };
-            let instance = wgpu::Instance::new(
-                wgpu::InstanceDescriptor::new_without_display_handle_from_env(),
-            );
+            let instance =
+                wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
             let adapter = match wgpu::util::initialize_adapter_from_env(&instance, None).await {
                 Ok(adapter) => adapter,
                 Err(_) => instance
@@ -86,10 +85,7 @@ impl Gpu {
             return Err(Error::new(
                 "size",
                 format!("{}x{}", size[0], size[1]),
-                format!(
-                    "1 to {limit} pixels each way, {} in all",
-                    limits.max_buffer_size / 16
-                ),
+                format!("1 to {limit} pixels each way, {} in all", limits.max_buffer_size / 16),
             ));
         }
         Ok(())
@@ -98,12 +94,7 @@ impl Gpu {
     /// A texture of its own that passes render to and read from, and that can be copied out.
     pub fn target(&self, label: &str, size: [u32; 2], format: TextureFormat) -> TextureView {
         self.device
-            .create_texture(&descriptor(
-                label,
-                size,
-                format,
-                TextureUsages::RENDER_ATTACHMENT,
-            ))
+            .create_texture(&descriptor(label, size, format, TextureUsages::RENDER_ATTACHMENT))
             .create_view(&Default::default())
     }
 
@@ -181,9 +172,7 @@ impl Gpu {
 
     /// The first bytes of a buffer.
     pub(super) fn read_buffer(&self, buffer: &wgpu::Buffer, bytes: u64) -> Vec<u8> {
-        self.read_back(bytes, |encoder, to| {
-            encoder.copy_buffer_to_buffer(buffer, 0, to, 0, bytes)
-        })
+        self.read_back(bytes, |encoder, to| encoder.copy_buffer_to_buffer(buffer, 0, to, 0, bytes))
     }
 
     /// What `copy` records into a buffer of so many bytes.
@@ -225,19 +214,12 @@ fn descriptor<'a>(
 ) -> wgpu::TextureDescriptor<'a> {
     wgpu::TextureDescriptor {
         label: Some(label),
-        size: wgpu::Extent3d {
-            width: size[0],
-            height: size[1],
-            depth_or_array_layers: 1,
-        },
+        size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format,
-        usage: usage
-            | TextureUsages::TEXTURE_BINDING
-            | TextureUsages::COPY_SRC
-            | TextureUsages::COPY_DST,
+        usage: usage | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC | TextureUsages::COPY_DST,
         view_formats: &[],
     }
 }

@@ -46,8 +46,8 @@ impl Head {
             let off = (*p - middle).abs();
             p.y >= above_y && p.y <= self.max.y && off.dot(across) <= 0.2 * size.dot(across)
         });
-        let here = here
-            .filter(|p| ((*p - middle) * self.forward).abs().max_element() <= size.max_element());
+        let here =
+            here.filter(|p| ((*p - middle) * self.forward).abs().max_element() <= size.max_element());
         let foremost = here.max_by(|a, b| a.dot(self.forward).total_cmp(&b.dot(self.forward)));
         foremost.unwrap_or(middle)
     }
@@ -76,9 +76,7 @@ fn by_joints(scene: &Scene) -> Option<(Vec3, Vec3)> {
 /// The names that a primitive goes by.
 fn named(scene: &Scene, primitive: &Primitive, is: fn(&str) -> bool) -> bool {
     let material = &scene.materials[primitive.material].name;
-    [material, &primitive.name, &primitive.node]
-        .into_iter()
-        .any(|name| is(name))
+    [material, &primitive.name, &primitive.node].into_iter().any(|name| is(name))
 }
 
 /// Skin that is called a head or a face.
@@ -90,10 +88,7 @@ fn by_names(scene: &Scene) -> Option<(Vec3, Vec3)> {
 
 /// The skin around eyes, brows, lashes and teeth.
 fn by_features(scene: &Scene) -> Option<(Vec3, Vec3)> {
-    let features = scene
-        .primitives
-        .iter()
-        .filter(|p| named(scene, p, names::is_feature));
+    let features = scene.primitives.iter().filter(|p| named(scene, p, names::is_feature));
     let features = around(points(features.collect()).chain(scene.eyes.iter().copied()));
     let (min, max) = features?;
     // From ear to ear a head is about twice as wide as from eye to eye, and taller than wide.
@@ -105,18 +100,11 @@ fn by_features(scene: &Scene) -> Option<(Vec3, Vec3)> {
 /// The axis from the middle of the head to its eyes.
 fn forward(scene: &Scene, (min, max): (Vec3, Vec3)) -> Option<Vec3> {
     let inside = |p: &Vec3| p.cmpge(min).all() && p.cmple(max).all();
-    let eyes = scene
-        .primitives
-        .iter()
-        .filter(|p| named(scene, p, names::is_eye));
+    let eyes = scene.primitives.iter().filter(|p| named(scene, p, names::is_eye));
     let eyes = points(eyes.collect()).chain(scene.eyes.iter().copied());
     let (least, greatest) = around(eyes.filter(inside))?;
     let to = 0.5 * (least + greatest) - 0.5 * (min + max);
-    let axis = if to.x.abs() > to.z.abs() {
-        Vec3::X
-    } else {
-        Vec3::Z
-    };
+    let axis = if to.x.abs() > to.z.abs() { Vec3::X } else { Vec3::Z };
     let along = to.dot(axis);
     (along.abs() > 0.1 * (max - min).dot(axis)).then_some(axis * along.signum())
 }
@@ -138,13 +126,7 @@ struct Limb {
 impl Limb {
     fn new(section: (Vec3, Vec3)) -> Self {
         let area = area(section);
-        Self {
-            now: section,
-            all: section,
-            head: section,
-            widest: area,
-            narrowest: area,
-        }
+        Self { now: section, all: section, head: section, widest: area, narrowest: area }
     }
 
     /// One plane further down. What narrows and then widens beyond its widest has ended: that is a head on
@@ -170,9 +152,7 @@ impl Limb {
     /// As deep and as wide, with its ears, as heads are for their height.
     fn is_head(&self) -> bool {
         let size = self.head.1 - self.head.0;
-        [size.x, size.z]
-            .iter()
-            .all(|x| (0.4..=2.5).contains(&(x / size.y)))
+        [size.x, size.z].iter().all(|x| (0.4..=2.5).contains(&(x / size.y)))
     }
 }
 
@@ -209,22 +189,13 @@ fn sections(scene: &Scene, bottom: f32, top: f32) -> Vec<Vec<(Vec3, Vec3)>> {
     for primitive in scene.skin() {
         for triangle in primitive.indices.as_chunks::<3>().0 {
             let corners = triangle.map(|i| Vec3::from(primitive.vertices[i as usize].position));
-            let [low, high] =
-                [f32::min, f32::max].map(|f| f(f(corners[0].y, corners[1].y), corners[2].y));
-            let plane =
-                |y: f32| ((y - bottom) / step - 0.5).ceil().clamp(0.0, PLANES as f32) as usize;
-            for (i, cuts) in cuts
-                .iter_mut()
-                .enumerate()
-                .take(plane(high))
-                .skip(plane(low))
-            {
+            let [low, high] = [f32::min, f32::max].map(|f| f(f(corners[0].y, corners[1].y), corners[2].y));
+            let plane = |y: f32| ((y - bottom) / step - 0.5).ceil().clamp(0.0, PLANES as f32) as usize;
+            for (i, cuts) in cuts.iter_mut().enumerate().take(plane(high)).skip(plane(low)) {
                 let y = bottom + (i as f32 + 0.5) * step;
                 let edges = [0, 1, 2].map(|k| (corners[k], corners[(k + 1) % 3]));
                 let crossing = edges.iter().filter(|(a, b)| (a.y < y) != (b.y < y));
-                cuts.extend(around(
-                    crossing.map(|(a, b)| a.lerp(*b, (y - a.y) / (b.y - a.y))),
-                ));
+                cuts.extend(around(crossing.map(|(a, b)| a.lerp(*b, (y - a.y) / (b.y - a.y)))));
             }
         }
     }

@@ -75,11 +75,7 @@ impl Sky {
         let horizon = Vec3::new(0.075, 0.076, 0.082);
         let floor = Vec3::new(0.042, 0.036, 0.032);
         Self::project(|d| {
-            if d.y > 0.0 {
-                horizon.lerp(zenith, d.y)
-            } else {
-                horizon.lerp(floor, (-3.0 * d.y).min(1.0))
-            }
+            if d.y > 0.0 { horizon.lerp(zenith, d.y) } else { horizon.lerp(floor, (-3.0 * d.y).min(1.0)) }
         })
     }
 
@@ -88,10 +84,7 @@ impl Sky {
     pub fn project(radiance: impl Fn(Vec3) -> Vec3) -> Self {
         const SAMPLES: usize = 4096;
         // Normalisation of each basis function, and the cosine's share A_l/π of its band.
-        let y = [
-            0.282095, 0.488603, 0.488603, 0.488603, 1.092548, 1.092548, 0.315392, 1.092548,
-            0.546274,
-        ];
+        let y = [0.282095, 0.488603, 0.488603, 0.488603, 1.092548, 1.092548, 0.315392, 1.092548, 0.546274];
         let a = [1.0, 2.0 / 3.0, 0.25];
         let mut sky = [Vec3::ZERO; 9];
         for i in 0..SAMPLES {
@@ -111,17 +104,7 @@ impl Sky {
 }
 
 fn basis(d: Vec3) -> [f32; 9] {
-    [
-        1.0,
-        d.y,
-        d.z,
-        d.x,
-        d.x * d.y,
-        d.y * d.z,
-        3.0 * d.z * d.z - 1.0,
-        d.x * d.z,
-        d.x * d.x - d.y * d.y,
-    ]
+    [1.0, d.y, d.z, d.x, d.x * d.y, d.y * d.z, 3.0 * d.z * d.z - 1.0, d.x * d.z, d.x * d.x - d.y * d.y]
 }
 
 impl Default for Lighting {
@@ -296,10 +279,7 @@ impl Lights {
             label,
             layout: &layout,
             entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: uniform.as_entire_binding(),
-                },
+                wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
                 wgpu::BindGroupEntry {
                     binding: 1,
                     resource: wgpu::BindingResource::TextureView(&maps.create_view(
@@ -309,10 +289,7 @@ impl Lights {
                         },
                     )),
                 },
-                wgpu::BindGroupEntry {
-                    binding: 2,
-                    resource: wgpu::BindingResource::Sampler(&sampler),
-                },
+                wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::Sampler(&sampler) },
             ],
         });
 
@@ -343,14 +320,7 @@ impl Lights {
             multiview_mask: None,
             cache: None,
         });
-        Self {
-            layout,
-            group,
-            uniform,
-            maps,
-            pipeline,
-            map_layout,
-        }
+        Self { layout, group, uniform, maps, pipeline, map_layout }
     }
 
     /// Uploads the lights and draws their shadow maps.
@@ -362,27 +332,19 @@ impl Lights {
         bounds: (Vec3, Vec3),
     ) -> Result<(), Error> {
         let uniform = lighting.uniform(bounds)?;
-        gpu.queue
-            .write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
+        gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
         gpu.run(|encoder| {
             for (layer, light) in uniform.lights[..uniform.count as usize].iter().enumerate() {
                 // Map coordinates to clip space: x and y from 0..1 to −1..1, y turned up.
-                let to_clip = Mat4::from_cols(
-                    2.0 * Vec4::X,
-                    -2.0 * Vec4::Y,
-                    Vec4::Z,
-                    Vec4::new(-1.0, 1.0, 0.0, 1.0),
-                ) * light.to_map;
+                let to_clip =
+                    Mat4::from_cols(2.0 * Vec4::X, -2.0 * Vec4::Y, Vec4::Z, Vec4::new(-1.0, 1.0, 0.0, 1.0))
+                        * light.to_map;
                 let buffer = gpu.uniform::<Mat4>("subsurface_lab::renderer shadow");
-                gpu.queue
-                    .write_buffer(&buffer, 0, bytemuck::bytes_of(&to_clip));
+                gpu.queue.write_buffer(&buffer, 0, bytemuck::bytes_of(&to_clip));
                 let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                     label: Some("subsurface_lab::renderer shadow"),
                     layout: &self.map_layout,
-                    entries: &[wgpu::BindGroupEntry {
-                        binding: 0,
-                        resource: buffer.as_entire_binding(),
-                    }],
+                    entries: &[wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
                 });
                 let view = self.maps.create_view(&wgpu::TextureViewDescriptor {
                     dimension: Some(wgpu::TextureViewDimension::D2),
@@ -417,17 +379,7 @@ mod tests {
     #[test]
     fn lights_lie_as_the_shader_has_them() {
         let shader = include_str!("lighting.wgsl");
-        assert_layout!(
-            shader,
-            "Light",
-            LightUniform {
-                direction,
-                tan_radius,
-                color,
-                pad,
-                to_map
-            }
-        );
+        assert_layout!(shader, "Light", LightUniform { direction, tan_radius, color, pad, to_map });
         assert_layout!(
             shader,
             "Lighting",

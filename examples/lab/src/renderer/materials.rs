@@ -26,16 +26,8 @@ impl Reader<'_> {
         let pbr = from.pbr_metallic_roughness();
         let old = from.pbr_specular_glossiness();
         let (factor, base, roughness) = match &old {
-            Some(old) => (
-                old.diffuse_factor(),
-                old.diffuse_texture(),
-                1.0 - old.glossiness_factor(),
-            ),
-            None => (
-                pbr.base_color_factor(),
-                pbr.base_color_texture(),
-                pbr.roughness_factor(),
-            ),
+            Some(old) => (old.diffuse_factor(), old.diffuse_texture(), 1.0 - old.glossiness_factor()),
+            None => (pbr.base_color_factor(), pbr.base_color_texture(), pbr.roughness_factor()),
         };
         let lay = |texture: gltf::Texture<'a>, set: u32, transform: Option<&Value>| {
             (Mapping::new(&texture, set, transform), texture)
@@ -48,15 +40,10 @@ impl Reader<'_> {
         if let (Some(base), Some(map)) = (&base, &normal)
             && base.0 != map.0
         {
-            self.scene.left_out.insert(format!(
-                "{name}'s normal map, whose UVs are not its colours'"
-            ));
+            self.scene.left_out.insert(format!("{name}'s normal map, whose UVs are not its colours'"));
             normal = None;
         }
-        let mapping = base
-            .as_ref()
-            .or(normal.as_ref())
-            .map(|(mapping, _)| *mapping);
+        let mapping = base.as_ref().or(normal.as_ref()).map(|(mapping, _)| *mapping);
         let mapping = mapping.unwrap_or_default();
         // JSON holds no infinity, but numbers that are too large for a float.
         if !normal_scale.is_finite() {
@@ -88,20 +75,11 @@ impl Reader<'_> {
     fn image(&mut self, texture: &gltf::Texture) -> Result<usize, Error> {
         // Not through the crate's `Image::source`, which panics if there is none.
         let images = &self.document.as_json().images;
-        let webp = || {
-            texture
-                .extension_value("EXT_texture_webp")?
-                .get("source")?
-                .as_u64()
-        };
+        let webp = || texture.extension_value("EXT_texture_webp")?.get("source")?.as_u64();
         let source = texture.source().map(|image| image.index());
         let source = source.or_else(|| usize::try_from(webp()?).ok());
         let Some((index, json)) = source.and_then(|i| Some((i, images.get(i)?))) else {
-            let others: Vec<_> = texture
-                .extensions()
-                .into_iter()
-                .flat_map(|all| all.keys())
-                .collect();
+            let others: Vec<_> = texture.extensions().into_iter().flat_map(|all| all.keys()).collect();
             let got = format!("no image, but {others:?}");
             let input = format!("{}, texture {}", self.input, texture.index());
             return Err(Error::new(input, got, "a JPEG, PNG or WebP image"));
@@ -197,12 +175,8 @@ fn profile(
     alone: bool,
 ) -> Result<(u8, String), Error> {
     let extras = from.extras().as_ref().map(|raw| raw.get());
-    let extras: Option<Value> =
-        extras.and_then(|text| gltf::json::deserialize::from_str(text).ok());
-    if let Some(profile) = extras
-        .as_ref()
-        .and_then(|extras| extras.get("subsurface_profile"))
-    {
+    let extras: Option<Value> = extras.and_then(|text| gltf::json::deserialize::from_str(text).ok());
+    if let Some(profile) = extras.as_ref().and_then(|extras| extras.get("subsurface_profile")) {
         let in_range = |p: &f64| p.fract() == 0.0 && (0.0..=255.0).contains(p);
         let input = || format!("{name}, subsurface_profile");
         let fail = || Error::new(input(), profile, "an integer from 0 to 255");
@@ -216,17 +190,10 @@ fn profile(
         && (metallic, roughness) != (1.0, 1.0)
         && pbr.metallic_roughness_texture().is_none()
         && from.pbr_specular_glossiness().is_none();
-    let transmits = from
-        .transmission()
-        .is_some_and(|t| t.transmission_factor() > 0.0);
-    let scatters = [
-        "KHR_materials_volume_scatter",
-        "KHR_materials_diffuse_transmission",
-    ];
+    let transmits = from.transmission().is_some_and(|t| t.transmission_factor() > 0.0);
+    let scatters = ["KHR_materials_volume_scatter", "KHR_materials_diffuse_transmission"];
     // A mesh of several materials is not named for each.
-    let others = [name]
-        .into_iter()
-        .chain([mesh, node].into_iter().filter(|_| alone));
+    let others = [name].into_iter().chain([mesh, node].into_iter().filter(|_| alone));
     let other = others.filter_map(names::not_skin).next();
     let word = [name, mesh, node].into_iter().find_map(names::skin);
     Ok(if is_metal {
@@ -235,10 +202,7 @@ fn profile(
         (0, "lets light through".into())
     } else if let Some(other) = other {
         (0, format!("\"{other}\""))
-    } else if let Some(scatters) = scatters
-        .into_iter()
-        .find(|e| from.extension_value(e).is_some())
-    {
+    } else if let Some(scatters) = scatters.into_iter().find(|e| from.extension_value(e).is_some()) {
         (1, scatters.into())
     } else if let Some(word) = word {
         (1, format!("\"{word}\""))

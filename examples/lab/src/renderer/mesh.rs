@@ -39,12 +39,11 @@ const ATTRIBUTES: [wgpu::VertexAttribute; 7] = wgpu::vertex_attr_array![
 ];
 
 impl Mesh {
-    pub const VERTEX_LAYOUT: Option<wgpu::VertexBufferLayout<'static>> =
-        Some(wgpu::VertexBufferLayout {
-            array_stride: size_of::<Vertex>() as u64,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &ATTRIBUTES,
-        });
+    pub const VERTEX_LAYOUT: Option<wgpu::VertexBufferLayout<'static>> = Some(wgpu::VertexBufferLayout {
+        array_stride: size_of::<Vertex>() as u64,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &ATTRIBUTES,
+    });
 
     /// Layout of a material's bind group.
     pub fn material_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
@@ -58,39 +57,30 @@ impl Mesh {
             },
             count: None,
         };
-        gpu.device
-            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some("subsurface_lab::renderer material"),
-                entries: &[
-                    uniform_entry(wgpu::ShaderStages::FRAGMENT),
-                    texture(1),
-                    texture(2),
-                    wgpu::BindGroupLayoutEntry {
-                        binding: 3,
-                        visibility: wgpu::ShaderStages::FRAGMENT,
-                        ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
-                        count: None,
-                    },
-                ],
-            })
+        gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("subsurface_lab::renderer material"),
+            entries: &[
+                uniform_entry(wgpu::ShaderStages::FRAGMENT),
+                texture(1),
+                texture(2),
+                wgpu::BindGroupLayoutEntry {
+                    binding: 3,
+                    visibility: wgpu::ShaderStages::FRAGMENT,
+                    ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+                    count: None,
+                },
+            ],
+        })
     }
 
     /// All primitives of a scene.
     ///
     /// # Errors
     /// A primitive that is too large for a buffer.
-    pub fn upload(
-        gpu: &Gpu,
-        scene: &Scene,
-        layout: &wgpu::BindGroupLayout,
-    ) -> Result<Vec<Self>, Error> {
+    pub fn upload(gpu: &Gpu, scene: &Scene, layout: &wgpu::BindGroupLayout) -> Result<Vec<Self>, Error> {
         let label = Some("subsurface_lab::renderer mesh");
         let texture = |index: Option<usize>, format, default: [u8; 4]| {
-            let plain = Image {
-                width: 1,
-                height: 1,
-                rgba8: default.to_vec(),
-            };
+            let plain = Image { width: 1, height: 1, rgba8: default.to_vec() };
             upload_image(gpu, index.map_or(&plain, |i| &scene.images[i]), format)
         };
         let sampler = |[u, v]: [wgpu::AddressMode; 2]| {
@@ -105,12 +95,7 @@ impl Mesh {
             })
         };
         let buffer = |contents: &[u8], usage| {
-            gpu.device
-                .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                    label,
-                    contents,
-                    usage,
-                })
+            gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label, contents, usage })
         };
         scene
             .primitives
@@ -135,16 +120,10 @@ impl Mesh {
                     procedural: primitive.procedural.into(),
                     pad: [0; 3],
                 };
-                let color = texture(
-                    material.base_color_texture,
-                    wgpu::TextureFormat::Rgba8UnormSrgb,
-                    [255; 4],
-                );
-                let normal = texture(
-                    material.normal_texture,
-                    wgpu::TextureFormat::Rgba8Unorm,
-                    [128, 128, 255, 255],
-                );
+                let color =
+                    texture(material.base_color_texture, wgpu::TextureFormat::Rgba8UnormSrgb, [255; 4]);
+                let normal =
+                    texture(material.normal_texture, wgpu::TextureFormat::Rgba8Unorm, [128, 128, 255, 255]);
                 let uniform = buffer(bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM);
                 let sampler = sampler(material.wrap);
                 let resources = [
@@ -154,8 +133,7 @@ impl Mesh {
                     wgpu::BindingResource::Sampler(&sampler),
                 ];
                 let entries = (0..).zip(resources);
-                let entries =
-                    entries.map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
+                let entries = entries.map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
                 let material_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
                     label,
                     layout,
@@ -167,14 +145,8 @@ impl Mesh {
                     pages: primitive.pages.clone(),
                     profile_id: material.profile_id,
                     material: material_group,
-                    vertices: buffer(
-                        bytemuck::cast_slice(&primitive.vertices),
-                        wgpu::BufferUsages::VERTEX,
-                    ),
-                    indices: buffer(
-                        bytemuck::cast_slice(&primitive.indices),
-                        wgpu::BufferUsages::INDEX,
-                    ),
+                    vertices: buffer(bytemuck::cast_slice(&primitive.vertices), wgpu::BufferUsages::VERTEX),
+                    indices: buffer(bytemuck::cast_slice(&primitive.indices), wgpu::BufferUsages::INDEX),
                 })
             })
             .collect()
@@ -207,11 +179,7 @@ fn upload_image(gpu: &Gpu, image: &Image, format: wgpu::TextureFormat) -> wgpu::
             &gpu.queue,
             &wgpu::TextureDescriptor {
                 label: Some("subsurface_lab::renderer image"),
-                size: wgpu::Extent3d {
-                    width,
-                    height,
-                    depth_or_array_layers: 1,
-                },
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
                 mip_level_count: levels,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
@@ -241,11 +209,7 @@ fn half(image: &Image) -> Image {
             }
         }
     }
-    Image {
-        width,
-        height,
-        rgba8,
-    }
+    Image { width, height, rgba8 }
 }
 
 #[cfg(test)]
@@ -260,14 +224,7 @@ mod tests {
         assert_layout!(
             SHADER,
             "Material",
-            MaterialUniform {
-                base_color,
-                normal_scale,
-                alpha_cutoff,
-                slope,
-                profile_id,
-                procedural
-            }
+            MaterialUniform { base_color, normal_scale, alpha_cutoff, slope, profile_id, procedural }
         );
     }
 
@@ -277,13 +234,7 @@ mod tests {
         assert_layout!(
             SHADER,
             "Camera",
-            CameraUniform {
-                view,
-                view_projection,
-                inverse_view_projection,
-                eye,
-                mm_per_unit
-            }
+            CameraUniform { view, view_projection, inverse_view_projection, eye, mm_per_unit }
         );
     }
 }

@@ -128,21 +128,12 @@ impl Renderer {
         gpu.check_size(size)?;
         let target = |name, format| gpu.target(name, size, format);
         let gbuffer = GBuffer {
-            albedo: target(
-                "subsurface_lab::renderer albedo",
-                TextureFormat::Rgba16Float,
-            ),
-            normal: target(
-                "subsurface_lab::renderer normal",
-                TextureFormat::Rgba16Float,
-            ),
+            albedo: target("subsurface_lab::renderer albedo", TextureFormat::Rgba16Float),
+            normal: target("subsurface_lab::renderer normal", TextureFormat::Rgba16Float),
             profile_id: target("subsurface_lab::renderer profile id", TextureFormat::R8Uint),
             depth: target("subsurface_lab::renderer depth", DEPTH),
             irradiance: target("subsurface_lab::renderer irradiance", IRRADIANCE),
-            specular: target(
-                "subsurface_lab::renderer specular",
-                TextureFormat::Rgba16Float,
-            ),
+            specular: target("subsurface_lab::renderer specular", TextureFormat::Rgba16Float),
         };
         let camera_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label: Some("subsurface_lab::renderer camera"),
@@ -152,10 +143,7 @@ impl Renderer {
         let camera_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("subsurface_lab::renderer camera"),
             layout: &camera_layout,
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: camera.as_entire_binding(),
-            }],
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: camera.as_entire_binding() }],
         });
         let material_layout = Mesh::material_layout(gpu);
         let lights = Lights::new(gpu);
@@ -177,11 +165,7 @@ impl Renderer {
                 vertex: "vs_screen",
                 fragment: "fs_gbuffer",
                 groups: &[Some(&camera_layout), Some(&material_layout)],
-                targets: &[
-                    TextureFormat::Rgba16Float,
-                    TextureFormat::Rgba16Float,
-                    TextureFormat::R8Uint,
-                ],
+                targets: &[TextureFormat::Rgba16Float, TextureFormat::Rgba16Float, TextureFormat::R8Uint],
                 buffers: &[Mesh::VERTEX_LAYOUT],
                 depth_stencil: Some(depth_state(wgpu::CompareFunction::Greater, true)),
             },
@@ -191,12 +175,7 @@ impl Renderer {
             gpu,
             "subsurface_lab::renderer deferred",
             None,
-            &[
-                &gbuffer.albedo,
-                &gbuffer.normal,
-                &gbuffer.profile_id,
-                &gbuffer.depth,
-            ],
+            &[&gbuffer.albedo, &gbuffer.normal, &gbuffer.profile_id, &gbuffer.depth],
         );
         let shade = pipeline(
             gpu,
@@ -212,12 +191,7 @@ impl Renderer {
                 ),
                 vertex: "vs_main",
                 fragment: "fs_lighting",
-                groups: &[
-                    Some(&camera_layout),
-                    None,
-                    Some(&lights.layout),
-                    Some(&shade_layout),
-                ],
+                groups: &[Some(&camera_layout), None, Some(&lights.layout), Some(&shade_layout)],
                 targets: &[IRRADIANCE, TextureFormat::Rgba16Float],
                 buffers: &[],
                 depth_stencil: None,
@@ -229,21 +203,13 @@ impl Renderer {
             gpu,
             "subsurface_lab::renderer compose",
             Some(&compose_uniform),
-            &[
-                &gbuffer.irradiance,
-                &gbuffer.albedo,
-                &gbuffer.specular,
-                &gbuffer.depth,
-            ],
+            &[&gbuffer.irradiance, &gbuffer.albedo, &gbuffer.specular, &gbuffer.depth],
         );
         let compose = pipeline(
             gpu,
             Pipeline {
                 label: "subsurface_lab::renderer compose",
-                shader: &module(
-                    "subsurface_lab::renderer compose",
-                    &[include_str!("compose.wgsl")],
-                ),
+                shader: &module("subsurface_lab::renderer compose", &[include_str!("compose.wgsl")]),
                 vertex: "vs_main",
                 fragment: "fs_compose",
                 groups: &[Some(&compose_layout)],
@@ -290,10 +256,8 @@ impl Renderer {
             eye: camera.eye,
             mm_per_unit,
         };
-        gpu.queue
-            .write_buffer(&self.camera, 0, bytemuck::bytes_of(&uniform));
-        self.lights
-            .render(gpu, lighting, &self.meshes, self.bounds)?;
+        gpu.queue.write_buffer(&self.camera, 0, bytemuck::bytes_of(&uniform));
+        self.lights.render(gpu, lighting, &self.meshes, self.bounds)?;
 
         let g = &self.gbuffer;
         let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
@@ -302,10 +266,7 @@ impl Renderer {
                 label: Some("subsurface_lab::renderer gbuffer"),
                 color_attachments: &[&g.albedo, &g.normal, &g.profile_id]
                     .map(|view| Some(color_attachment(view, clear))),
-                depth_stencil_attachment: Some(depth_attachment(
-                    &g.depth,
-                    wgpu::LoadOp::Clear(0.0),
-                )),
+                depth_stencil_attachment: Some(depth_attachment(&g.depth, wgpu::LoadOp::Clear(0.0))),
                 ..Default::default()
             });
             pass.set_pipeline(&self.draw);
@@ -337,21 +298,12 @@ impl Renderer {
     }
 
     /// The picture that a diffuse layer gives: tone-mapped sRGB bytes, red, green, blue.
-    pub fn compose(
-        &self,
-        gpu: &Gpu,
-        diffuse: &TextureView,
-        layer: Layer,
-        exposure: f32,
-    ) -> Vec<[u8; 3]> {
+    pub fn compose(&self, gpu: &Gpu, diffuse: &TextureView, layer: Layer, exposure: f32) -> Vec<[u8; 3]> {
         let picture = gpu.target("subsurface_lab::renderer picture", self.size, PICTURE);
         gpu.queue.write_buffer(
             &self.compose_uniform,
             0,
-            bytemuck::bytes_of(&ComposeUniform {
-                exposure,
-                layer: (layer == Layer::Diffuse).into(),
-            }),
+            bytemuck::bytes_of(&ComposeUniform { exposure, layer: (layer == Layer::Diffuse).into() }),
         );
         let g = &self.gbuffer;
         let (_, group) = textures(
@@ -373,10 +325,7 @@ impl Renderer {
             pass.set_bind_group(0, &group, &[]);
             pass.draw(0..3, 0..1);
         });
-        gpu.read_bytes(picture.texture())
-            .chunks_exact(4)
-            .map(|p| [p[0], p[1], p[2]])
-            .collect()
+        gpu.read_bytes(picture.texture()).chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect()
     }
 }
 
@@ -404,10 +353,7 @@ fn textures(
     let mut entries = Vec::new();
     if let Some(buffer) = uniform {
         layout.push(uniform_entry(wgpu::ShaderStages::FRAGMENT));
-        entries.push(wgpu::BindGroupEntry {
-            binding: 0,
-            resource: buffer.as_entire_binding(),
-        });
+        entries.push(wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() });
     }
     for view in views {
         let binding = layout.len() as u32;
@@ -425,17 +371,12 @@ fn textures(
             },
             count: None,
         });
-        entries.push(wgpu::BindGroupEntry {
-            binding,
-            resource: wgpu::BindingResource::TextureView(view),
-        });
+        entries.push(wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::TextureView(view) });
     }
-    let layout = gpu
-        .device
-        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some(label),
-            entries: &layout,
-        });
+    let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some(label),
+        entries: &layout,
+    });
     let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
         label: Some(label),
         layout: &layout,
@@ -460,10 +401,7 @@ fn depth_attachment(
 ) -> wgpu::RenderPassDepthStencilAttachment<'_> {
     wgpu::RenderPassDepthStencilAttachment {
         view,
-        depth_ops: Some(wgpu::Operations {
-            load,
-            store: wgpu::StoreOp::Store,
-        }),
+        depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
         stencil_ops: None,
     }
 }
@@ -476,10 +414,7 @@ fn color_attachment(
         view,
         depth_slice: None,
         resolve_target: None,
-        ops: wgpu::Operations {
-            load,
-            store: wgpu::StoreOp::Store,
-        },
+        ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
     }
 }
 
@@ -498,46 +433,34 @@ struct Pipeline<'a> {
 }
 
 fn pipeline(gpu: &Gpu, parts: Pipeline) -> wgpu::RenderPipeline {
-    let Pipeline {
-        label,
-        shader,
-        vertex,
-        fragment,
-        groups,
-        targets,
-        buffers,
-        depth_stencil,
-    } = parts;
-    let layout = gpu
-        .device
-        .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(label),
-            bind_group_layouts: groups,
-            immediate_size: 0,
-        });
+    let Pipeline { label, shader, vertex, fragment, groups, targets, buffers, depth_stencil } = parts;
+    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(label),
+        bind_group_layouts: groups,
+        immediate_size: 0,
+    });
     let targets: Vec<_> = targets.iter().map(|&f| Some(f.into())).collect();
-    gpu.device
-        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(label),
-            layout: Some(&layout),
-            vertex: wgpu::VertexState {
-                module: shader,
-                entry_point: Some(vertex),
-                compilation_options: Default::default(),
-                buffers,
-            },
-            primitive: Default::default(),
-            depth_stencil,
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: shader,
-                entry_point: Some(fragment),
-                compilation_options: Default::default(),
-                targets: &targets,
-            }),
-            multiview_mask: None,
-            cache: None,
-        })
+    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(label),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: shader,
+            entry_point: Some(vertex),
+            compilation_options: Default::default(),
+            buffers,
+        },
+        primitive: Default::default(),
+        depth_stencil,
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: shader,
+            entry_point: Some(fragment),
+            compilation_options: Default::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
 }
 
 #[cfg(test)]
@@ -547,10 +470,6 @@ mod tests {
 
     #[test]
     fn compose_lies_as_the_shader_has_it() {
-        assert_layout!(
-            include_str!("compose.wgsl"),
-            "Compose",
-            ComposeUniform { exposure, layer }
-        );
+        assert_layout!(include_str!("compose.wgsl"), "Compose", ComposeUniform { exposure, layer });
     }
 }

@@ -13,8 +13,7 @@ const OTHER_PARTS: &str = "eye teeth tooth denture tongue hair lash beard mustac
     jacket vest sweater hood sock stocking shoe boot sneaker sandal glove helmet jewel earring necklace bracelet \
     watch piercing wear metal leather fabric armor armour accessor weapon sword button shadow floor";
 /// What lies on a face.
-const FEATURES: &str =
-    "eye eyeball brow eyebrow lash eyelash iris cornea pupil sclera teeth tongue";
+const FEATURES: &str = "eye eyeball brow eyebrow lash eyelash iris cornea pupil sclera teeth tongue";
 
 /// The words of a name in lower case: `N00_000_EyeIris.001` is n, eye, iris.
 fn words(name: &str) -> impl Iterator<Item = String> {

@@ -67,11 +67,7 @@ pub(super) fn paginate(vertices: &mut Vec<Vertex>, indices: &mut Vec<u32>) -> Ve
             pages.len() - 1
         });
         let (page, page_indices) = &mut pages[chosen];
-        for (to, from) in page[rows]
-            .iter_mut()
-            .flatten()
-            .zip(own.iter_mut().flatten())
-        {
+        for (to, from) in page[rows].iter_mut().flatten().zip(own.iter_mut().flatten()) {
             *to |= std::mem::take(from);
         }
         page_indices.extend(island.triangles.iter().flatten());
@@ -245,9 +241,7 @@ fn islands(vertices: &[Vertex], triangles: &[[u32; 3]]) -> Vec<Island> {
     // Triangles without UV area join whichever neighbour comes first.
     for corner in triangles.iter().flat_map(corners) {
         let root = find(&mut parent, corner);
-        let mut sides = [1, 2]
-            .map(|winding| corner - corner % 3 + winding)
-            .into_iter();
+        let mut sides = [1, 2].map(|winding| corner - corner % 3 + winding).into_iter();
         let neighbour = sides.find(|&side| used[side]);
         if let Some(neighbour) = neighbour
             && root.is_multiple_of(3)
@@ -285,33 +279,20 @@ mod tests {
     /// A grid of `n`×`n` squares at height `z` whose UVs are `uv(x, y)` for x and y 0 to 1.
     fn grid(n: u32, z: f32, uv: impl Fn(f32, f32) -> [f32; 2]) -> (Vec<Vertex>, Vec<u32>) {
         let vertex = |i: u32| {
-            let (x, y) = (
-                (i % (n + 1)) as f32 / n as f32,
-                (i / (n + 1)) as f32 / n as f32,
-            );
-            Vertex {
-                position: [x, y, z],
-                uv: uv(x, y),
-                ..Vertex::zeroed()
-            }
+            let (x, y) = ((i % (n + 1)) as f32 / n as f32, (i / (n + 1)) as f32 / n as f32);
+            Vertex { position: [x, y, z], uv: uv(x, y), ..Vertex::zeroed() }
         };
         let square = |i: u32| {
             let a = i / n * (n + 1) + i % n;
             [a, a + 1, a + n + 2, a, a + n + 2, a + n + 1]
         };
-        (
-            (0..(n + 1) * (n + 1)).map(vertex).collect(),
-            (0..n * n).flat_map(square).collect(),
-        )
+        ((0..(n + 1) * (n + 1)).map(vertex).collect(), (0..n * n).flat_map(square).collect())
     }
 
     /// Every triangle as positions, sorted, to compare meshes whose vertices were renumbered.
     fn triangles(vertices: &[Vertex], indices: &[u32]) -> Vec<Vec<[u32; 3]>> {
         let corner = |i: &u32| vertices[*i as usize].position.map(f32::to_bits);
-        let mut all: Vec<Vec<_>> = indices
-            .chunks(3)
-            .map(|t| t.iter().map(corner).collect())
-            .collect();
+        let mut all: Vec<Vec<_>> = indices.chunks(3).map(|t| t.iter().map(corner).collect()).collect();
         all.sort();
         all
     }
@@ -362,9 +343,7 @@ mod tests {
         ];
         for (uv, expected) in cases {
             let got = placed(uv);
-            let error = (got[0] - expected[0])
-                .abs()
-                .max((got[1] - expected[1]).abs());
+            let error = (got[0] - expected[0]).abs().max((got[1] - expected[1]).abs());
             assert!(error < 1e-6, "{uv:?} went to {got:?}, not to {expected:?}");
         }
     }

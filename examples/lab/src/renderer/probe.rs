@@ -36,42 +36,30 @@ impl Probe {
     /// The passes for what `renderer` draws.
     pub fn new(gpu: &Gpu, renderer: &Renderer) -> Self {
         let label = "subsurface_lab::renderer probe";
-        let shader = gpu
-            .device
-            .create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(label),
-                source: wgpu::ShaderSource::Wgsl(
-                    [
-                        include_str!("material.wgsl"),
-                        include_str!("lighting.wgsl"),
-                        include_str!("probe.wgsl"),
-                    ]
+        let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(
+                [include_str!("material.wgsl"), include_str!("lighting.wgsl"), include_str!("probe.wgsl")]
                     .concat()
                     .into(),
-                ),
-            });
-        let layout = gpu
-            .device
-            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some(label),
-                entries: &[wgpu::BindGroupLayoutEntry {
-                    binding: 0,
-                    visibility: wgpu::ShaderStages::FRAGMENT,
-                    ty: wgpu::BindingType::Texture {
-                        sample_type: wgpu::TextureSampleType::Float { filterable: false },
-                        view_dimension: wgpu::TextureViewDimension::D2Array,
-                        multisampled: false,
-                    },
-                    count: None,
-                }],
-            });
+            ),
+        });
+        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some(label),
+            entries: &[wgpu::BindGroupLayoutEntry {
+                binding: 0,
+                visibility: wgpu::ShaderStages::FRAGMENT,
+                ty: wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                    view_dimension: wgpu::TextureViewDimension::D2Array,
+                    multisampled: false,
+                },
+                count: None,
+            }],
+        });
         let places = gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
-            size: wgpu::Extent3d {
-                width: SIDE,
-                height: SIDE,
-                depth_or_array_layers: LAYERS,
-            },
+            size: wgpu::Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: LAYERS },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
@@ -100,10 +88,7 @@ impl Probe {
                     shader: &shader,
                     vertex: "vs_screen",
                     fragment,
-                    groups: &[
-                        Some(&renderer.camera_layout),
-                        Some(&renderer.material_layout),
-                    ],
+                    groups: &[Some(&renderer.camera_layout), Some(&renderer.material_layout)],
                     targets,
                     buffers: &[Mesh::VERTEX_LAYOUT],
                     depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Equal, false)),
@@ -146,13 +131,9 @@ impl Probe {
         let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
         gpu.run(|encoder| {
             // Three targets are more bytes a pixel than every device has to allow.
-            for (pipeline, targets) in
-                [(&self.position, &[&position][..]), (&self.steps, &[&x, &y])]
-            {
-                let attachments: Vec<_> = targets
-                    .iter()
-                    .map(|target| Some(super::color_attachment(target, clear)))
-                    .collect();
+            for (pipeline, targets) in [(&self.position, &[&position][..]), (&self.steps, &[&x, &y])] {
+                let attachments: Vec<_> =
+                    targets.iter().map(|target| Some(super::color_attachment(target, clear))).collect();
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     label: Some(label),
                     color_attachments: &attachments,
@@ -170,17 +151,10 @@ impl Probe {
                 }
             }
         });
-        let read = |view| {
-            gpu.read(view)
-                .into_iter()
-                .map(|[x, y, z, _]| Vec3::new(x, y, z))
-        };
+        let read = |view| gpu.read(view).into_iter().map(|[x, y, z, _]| Vec3::new(x, y, z));
         read(&position)
             .zip(read(&x).zip(read(&y)))
-            .map(|(point_mm, (x, y))| Visible {
-                point_mm,
-                steps_mm: [x, y],
-            })
+            .map(|(point_mm, (x, y))| Visible { point_mm, steps_mm: [x, y] })
             .collect()
     }
 
@@ -214,11 +188,7 @@ impl Probe {
                     bytes_per_row: Some(SIDE * 16),
                     rows_per_image: Some(rows),
                 },
-                wgpu::Extent3d {
-                    width: SIDE,
-                    height: rows,
-                    depth_or_array_layers: LAYERS,
-                },
+                wgpu::Extent3d { width: SIDE, height: rows, depth_or_array_layers: LAYERS },
             );
             gpu.run(|encoder| {
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -238,11 +208,7 @@ impl Probe {
                 pass.draw(0..3, 0..1);
             });
             let lit = gpu.read(&self.lit);
-            irradiance.extend(
-                lit[..places.len()]
-                    .iter()
-                    .map(|e| Vec3::new(e[0], e[1], e[2])),
-            );
+            irradiance.extend(lit[..places.len()].iter().map(|e| Vec3::new(e[0], e[1], e[2])));
         }
         irradiance
     }
@@ -259,8 +225,7 @@ fn texels(
     let corner = |i: usize| &primitive.vertices[primitive.indices[3 * triangle + i] as usize];
     let [a, b, c] = [corner(0), corner(1), corner(2)];
     let position = |i: usize| Vec3::from(corner(i).position);
-    let between =
-        |of: fn(&super::Vertex) -> Vec4| shares.x * of(a) + shares.y * of(b) + shares.z * of(c);
+    let between = |of: fn(&super::Vertex) -> Vec4| shares.x * of(a) + shares.y * of(b) + shares.z * of(c);
     let world = between(|v| Vec3::from(v.position).extend(0.0)).truncate();
     let normal = between(|v| Vec3::from(v.normal).extend(0.0)).truncate();
     // As a picture has it: by the triangle's own plane.

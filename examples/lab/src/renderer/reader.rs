@@ -35,14 +35,8 @@ const READ: [&str; 5] = [
 const HARMLESS: [&str; 4] = ["KHR_materials_", "KHR_lights_", "KHR_animation_", "KHR_xmp"];
 /// What a file needs instead, by what the extension's name holds.
 const INSTEAD: [(&str, &str); 3] = [
-    (
-        "draco",
-        "plain meshes, as Blender's or glTF-Transform's export writes them",
-    ),
-    (
-        "meshopt",
-        "plain meshes, as Blender's or glTF-Transform's export writes them",
-    ),
+    ("draco", "plain meshes, as Blender's or glTF-Transform's export writes them"),
+    ("meshopt", "plain meshes, as Blender's or glTF-Transform's export writes them"),
     ("texture", "JPEG, PNG or WebP images"),
 ];
 
@@ -70,15 +64,9 @@ pub(super) fn read(bytes: &[u8], base: Option<&Path>, input: &str) -> Result<Sce
         tree: &tree,
         buffers: Buffers(buffers),
         images: HashMap::new(),
-        scene: Scene {
-            left_out: left_out(document),
-            ..Scene::default()
-        },
+        scene: Scene { left_out: left_out(document), ..Scene::default() },
     };
-    for (node, mesh) in drawn
-        .into_iter()
-        .filter_map(|node| Some((node, node.mesh()?)))
-    {
+    for (node, mesh) in drawn.into_iter().filter_map(|node| Some((node, node.mesh()?))) {
         for primitive in mesh.primitives() {
             reader.add(node, &mesh, &primitive)?;
         }
@@ -91,12 +79,7 @@ pub(super) fn read(bytes: &[u8], base: Option<&Path>, input: &str) -> Result<Sce
     let is_named = scene.materials.iter().any(|m| m.profile_id != 0);
     for material in scene.materials.iter_mut().filter(|m| m.reason.is_empty()) {
         material.profile_id = (!is_named).into();
-        material.reason = if is_named {
-            "no such name"
-        } else {
-            "no name says otherwise"
-        }
-        .into();
+        material.reason = if is_named { "no such name" } else { "no name says otherwise" }.into();
     }
     let joints = document.skins().flat_map(|skin| skin.joints());
     let eyes = joints.filter(|joint| joint.name().is_some_and(names::is_eye));
@@ -114,17 +97,10 @@ fn parse(bytes: &[u8]) -> Result<gltf::Gltf, Problem> {
     }
     let gltf = gltf::Gltf::from_slice_without_validation(bytes).map_err(|e| fail(e.to_string()))?;
     let known = |name: &str| READ.contains(&name) || HARMLESS.iter().any(|h| name.starts_with(h));
-    if let Some(name) = gltf
-        .document
-        .extensions_required()
-        .find(|name| !known(name))
-    {
+    if let Some(name) = gltf.document.extensions_required().find(|name| !known(name)) {
         let instead = INSTEAD.iter().find(|(part, _)| name.contains(part));
         let needs = instead.map_or("a file that does not require it", |(_, needs)| needs);
-        return Err((
-            format!("{name}, which it requires and this program does not read"),
-            needs,
-        ));
+        return Err((format!("{name}, which it requires and this program does not read"), needs));
     }
     // and validates POSITION accessors before it knows that they exist.
     let root = gltf.document.as_json();
@@ -148,34 +124,20 @@ fn parse(bytes: &[u8]) -> Result<gltf::Gltf, Problem> {
 
 /// What the file has and is not shown, by name.
 fn left_out(document: &gltf::Document) -> BTreeSet<String> {
-    let extensions = document
-        .extensions_used()
-        .filter(|name| !READ.contains(name));
+    let extensions = document.extensions_used().filter(|name| !READ.contains(name));
     let mut all: BTreeSet<String> = extensions.map(str::to_string).collect();
     let any = |has: fn(&gltf::Material) -> bool| document.materials().any(|m| has(&m));
     let parts = [
         ("animations", document.animations().len() > 0),
         ("cameras", document.cameras().len() > 0),
-        (
-            "light that surfaces emit",
-            any(|m| m.emissive_factor() != [0.0; 3]),
-        ),
+        ("light that surfaces emit", any(|m| m.emissive_factor() != [0.0; 3])),
         ("occlusion maps", any(|m| m.occlusion_texture().is_some())),
         (
             "maps of metalness and roughness",
-            any(|m| {
-                m.pbr_metallic_roughness()
-                    .metallic_roughness_texture()
-                    .is_some()
-            }),
+            any(|m| m.pbr_metallic_roughness().metallic_roughness_texture().is_some()),
         ),
     ];
-    all.extend(
-        parts
-            .into_iter()
-            .filter(|(_, has)| *has)
-            .map(|(name, _)| name.to_string()),
-    );
+    all.extend(parts.into_iter().filter(|(_, has)| *has).map(|(name, _)| name.to_string()));
     all
 }
 
@@ -193,10 +155,7 @@ impl Tree {
         let nodes: Vec<_> = document.nodes().collect();
         let twice = |i: usize| format!("node {i} in two places");
         let mut parents = vec![None; nodes.len()];
-        for (i, child) in nodes
-            .iter()
-            .flat_map(|n| n.children().map(|c| (n.index(), c.index())))
-        {
+        for (i, child) in nodes.iter().flat_map(|n| n.children().map(|c| (n.index(), c.index()))) {
             if parents[child].replace(i).is_some() {
                 return Err(twice(child));
             }
@@ -222,11 +181,7 @@ impl Tree {
             return Err("nodes in a circle".into());
         }
         order.retain(|&i| shown[i]);
-        Ok(Self {
-            parents,
-            worlds,
-            drawn: order,
-        })
+        Ok(Self { parents, worlds, drawn: order })
     }
 }
 
@@ -249,9 +204,7 @@ fn check_size(nodes: &[&gltf::Node]) -> Result<(), String> {
         return Err(format!("{triangles} triangles, more than {MAX_TRIANGLES}"));
     }
     if vertices > MAX_VERTICES {
-        return Err(format!(
-            "{vertices} vertices to read, more than {MAX_VERTICES}"
-        ));
+        return Err(format!("{vertices} vertices to read, more than {MAX_VERTICES}"));
     }
     Ok(())
 }
@@ -301,12 +254,7 @@ pub(super) struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn add(
-        &mut self,
-        node: &gltf::Node,
-        mesh: &gltf::Mesh,
-        from: &gltf::Primitive,
-    ) -> Result<(), Error> {
+    fn add(&mut self, node: &gltf::Node, mesh: &gltf::Mesh, from: &gltf::Primitive) -> Result<(), Error> {
         let node_name = node.name().unwrap_or_default();
         let mesh_name = match (mesh.name(), node_name) {
             (Some(name), _) => name.to_string(),
@@ -314,40 +262,22 @@ impl Reader<'_> {
             (None, name) => name.to_string(),
         };
         let alone = mesh.primitives().len() == 1;
-        let name = if alone {
-            mesh_name.clone()
-        } else {
-            format!("{mesh_name}/{}", from.index())
-        };
+        let name = if alone { mesh_name.clone() } else { format!("{mesh_name}/{}", from.index()) };
         let fail = |(got, needs): Problem| Error::new(&name, got, needs);
         let count = from.get(&Semantic::Positions).map_or(0, |a| a.count());
         let triangles = self.triangles(from, count).map_err(fail)?;
         if triangles.is_empty() {
-            self.scene
-                .left_out
-                .insert(format!("{name}, which has no triangles"));
+            self.scene.left_out.insert(format!("{name}, which has no triangles"));
             return Ok(());
         }
-        if from
-            .material()
-            .transmission()
-            .is_some_and(|t| t.transmission_factor() >= 0.5)
-        {
-            self.scene
-                .left_out
-                .insert(format!("{name}, which lets light through"));
+        if from.material().transmission().is_some_and(|t| t.transmission_factor() >= 0.5) {
+            self.scene.left_out.insert(format!("{name}, which lets light through"));
             return Ok(());
         }
-        let (material, mapping) =
-            self.material(&from.material(), [&mesh_name, node_name], alone)?;
+        let (material, mapping) = self.material(&from.material(), [&mesh_name, node_name], alone)?;
         let attributes = self.attributes(node, mesh, from, &mapping).map_err(fail)?;
         // Placed, they would be made up anew, as those are that a transform flattens.
-        if !attributes
-            .normals
-            .as_flattened()
-            .iter()
-            .all(|x| x.is_finite())
-        {
+        if !attributes.normals.as_flattened().iter().all(|x| x.is_finite()) {
             return Err(fail(("NaN or infinity".into(), "finite normals")));
         }
         let world = self.tree.worlds[node.index()];
@@ -392,19 +322,12 @@ impl Reader<'_> {
                     return Err(named((format!("{kind:?}"), "whole numbers")));
                 }
                 let indices = self.buffers.read(&accessor, accessor.count(), |x| x as u32);
-                indices
-                    .map_err(named)?
-                    .into_iter()
-                    .map(|[index]| index)
-                    .collect()
+                indices.map_err(named)?.into_iter().map(|[index]| index).collect()
             }
             None => (0..count as u32).collect(),
         };
         if let Some(index) = corners.iter().find(|&&i| i as usize >= count) {
-            return Err((
-                format!("index {index} of {count} vertices"),
-                "existing vertices",
-            ));
+            return Err((format!("index {index} of {count} vertices"), "existing vertices"));
         }
         let runs = 0..corners.len().saturating_sub(2);
         let corner = |k: usize| corners[k];

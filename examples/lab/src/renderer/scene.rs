@@ -149,16 +149,13 @@ impl Scene {
                 self.primitives[i].material = self.material(material);
             }
             if !found {
-                let names = self.primitives.iter().flat_map(|p| {
-                    [&self.materials[p.material].name, &p.name, &p.node].map(String::as_str)
-                });
+                let names = self
+                    .primitives
+                    .iter()
+                    .flat_map(|p| [&self.materials[p.material].name, &p.name, &p.node].map(String::as_str));
                 let names: BTreeSet<&str> = names.filter(|name| !name.is_empty()).collect();
                 let needs = names.into_iter().collect::<Vec<_>>().join(", ");
-                return Err(Error::new(
-                    option,
-                    name,
-                    format!("a name of the model: {needs}"),
-                ));
+                return Err(Error::new(option, name, format!("a name of the model: {needs}")));
             }
         }
         Ok(())
@@ -178,9 +175,7 @@ impl Scene {
         let materials = |is_skin: bool| -> BTreeSet<String> {
             let materials = self.primitives.iter().map(|p| &self.materials[p.material]);
             let chosen = materials.filter(|m| (m.profile_id != 0) == is_skin);
-            chosen
-                .map(|m| format!("{} ({})", m.name, m.reason))
-                .collect()
+            chosen.map(|m| format!("{} ({})", m.name, m.reason)).collect()
         };
         let lists = [
             ("Skin", materials(true)),
@@ -188,8 +183,7 @@ impl Scene {
             ("Left out", self.left_out.clone()),
         ];
         let some = lists.into_iter().filter(|(_, list)| !list.is_empty());
-        some.map(|(title, list)| format!("{title}: {}.", Vec::from_iter(list).join(", ")))
-            .collect()
+        some.map(|(title, list)| format!("{title}: {}.", Vec::from_iter(list).join(", "))).collect()
     }
 
     /// Least and greatest corner of the world-space box around everything; zeros if there is nothing.
@@ -204,30 +198,18 @@ impl Scene {
 
     /// The primitives that scatter, or all if none does.
     pub(super) fn skin(&self) -> Vec<&Primitive> {
-        let scatters = |p: &&Primitive| {
-            self.materials
-                .get(p.material)
-                .is_some_and(|m| m.profile_id != 0)
-        };
+        let scatters = |p: &&Primitive| self.materials.get(p.material).is_some_and(|m| m.profile_id != 0);
         let skin: Vec<_> = self.primitives.iter().filter(scatters).collect();
-        if skin.is_empty() {
-            self.primitives.iter().collect()
-        } else {
-            skin
-        }
+        if skin.is_empty() { self.primitives.iter().collect() } else { skin }
     }
 }
 
 fn bounds<'a>(primitives: impl Iterator<Item = &'a Primitive>) -> (Vec3, Vec3) {
-    let points = primitives
-        .flat_map(|p| &p.vertices)
-        .map(|v| Vec3::from(v.position));
+    let points = primitives.flat_map(|p| &p.vertices).map(|v| Vec3::from(v.position));
     around(points).unwrap_or_default()
 }
 
 /// Least and greatest corner of the box around points.
 pub(super) fn around(points: impl Iterator<Item = Vec3>) -> Option<(Vec3, Vec3)> {
-    points
-        .map(|p| (p, p))
-        .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    points.map(|p| (p, p)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }

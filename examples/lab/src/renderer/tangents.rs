@@ -45,11 +45,7 @@ pub(super) fn compute_tangents(vertices: &mut [Vertex], indices: &[u32]) {
     }
     for (vertex, (along_u, along_v)) in vertices.iter_mut().zip(sums) {
         let bitangent = Vec3::from(vertex.normal).cross(along_u);
-        let handedness = if bitangent.dot(along_v) > 0.0 {
-            -1.0
-        } else {
-            1.0
-        };
+        let handedness = if bitangent.dot(along_v) > 0.0 { -1.0 } else { 1.0 };
         vertex.tangent = along_u.extend(handedness).into();
     }
 }

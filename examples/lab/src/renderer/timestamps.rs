@@ -17,11 +17,7 @@ pub struct Timestamps {
 impl Timestamps {
     /// So many queries; `None` where the device has no timestamps.
     pub fn new(gpu: &Gpu, count: u32) -> Option<Self> {
-        if !gpu
-            .device
-            .features()
-            .contains(wgpu::Features::TIMESTAMP_QUERY)
-        {
+        if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return None;
         }
         let label = Some("subsurface_lab::Timestamps");
@@ -54,11 +50,7 @@ impl Timestamps {
     }
 
     /// Submits what `record` records, waits, and reads as many queries as that says it wrote: in ms.
-    pub fn run<T>(
-        &self,
-        gpu: &Gpu,
-        record: impl FnOnce(&mut CommandEncoder) -> (T, u32),
-    ) -> (T, Vec<f64>) {
+    pub fn run<T>(&self, gpu: &Gpu, record: impl FnOnce(&mut CommandEncoder) -> (T, u32)) -> (T, Vec<f64>) {
         let (result, count) = gpu.run(|encoder| {
             let (result, count) = record(encoder);
             if count > 0 {

@@ -26,19 +26,13 @@ pub fn uniform(device: &Device, atlas: &Atlas) -> Result<Buffer, Error> {
         ));
     }
     if !atlas.mm_per_unit.is_finite() || atlas.mm_per_unit <= 0.0 {
-        return Err(Error::new(
-            "mm_per_unit",
-            atlas.mm_per_unit.to_string(),
-            "a finite number above 0",
-        ));
+        return Err(Error::new("mm_per_unit", atlas.mm_per_unit.to_string(), "a finite number above 0"));
     }
-    Ok(
-        device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("rivals atlas"),
-            contents: bytemuck::bytes_of(&Vec4::splat(atlas.mm_per_unit)),
-            usage: wgpu::BufferUsages::UNIFORM,
-        }),
-    )
+    Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("rivals atlas"),
+        contents: bytemuck::bytes_of(&Vec4::splat(atlas.mm_per_unit)),
+        usage: wgpu::BufferUsages::UNIFORM,
+    }))
 }
 
 /// The last pass.
@@ -53,10 +47,7 @@ impl Gutter {
             pass: Pass::new(
                 device,
                 "rivals gutter",
-                (
-                    &[TRIANGLE, include_str!("gutter.wgsl")].concat(),
-                    "fs_gutter",
-                ),
+                (&[TRIANGLE, include_str!("gutter.wgsl")].concat(), "fs_gutter"),
                 &[Slot::Float, Slot::Float],
                 &[format.into()],
                 &[],
@@ -68,10 +59,7 @@ impl Gutter {
     pub fn prepare(&mut self, device: &Device, sum: &TextureView, atlas: &Atlas) {
         let group = self.pass.bind(
             device,
-            &[
-                BindingResource::TextureView(sum),
-                BindingResource::TextureView(atlas.irradiance),
-            ],
+            &[BindingResource::TextureView(sum), BindingResource::TextureView(atlas.irradiance)],
         );
         self.prepared = Some(group);
     }

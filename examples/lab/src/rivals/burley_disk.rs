@@ -29,9 +29,7 @@ const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 /// error on that edge.
 pub fn fitted_shape(profile: &Profile) -> (DVec3, DVec3) {
     let terms = terms(profile);
-    let edge: Vec<_> = distances_mm(&terms)
-        .map(|x| (x, scattered_step(x, 0.0, &terms)))
-        .collect();
+    let edge: Vec<_> = distances_mm(&terms).map(|x| (x, scattered_step(x, 0.0, &terms))).collect();
     let radii = radii(256);
     let (mut shape, mut worst) = (DVec3::ZERO, DVec3::ZERO);
     for channel in 0..3 {
@@ -77,12 +75,7 @@ impl BurleyDisk {
     /// With at most `samples` samples a pixel, of the given shape in 1/mm.
     pub fn new(device: &Device, format: TextureFormat, shape: DVec3, samples: usize) -> Self {
         let slots = [Slot::Uniform, Slot::Float, Slot::Uint, Slot::Float];
-        let shader = [
-            SCREEN,
-            include_str!("burley_disk.wgsl"),
-            &samples_wgsl(shape, samples),
-        ]
-        .concat();
+        let shader = [SCREEN, include_str!("burley_disk.wgsl"), &samples_wgsl(shape, samples)].concat();
         Self {
             packed: Packed::new(device, format),
             disk: over_skin(
@@ -117,10 +110,8 @@ fn samples_wgsl(shape: DVec3, samples: usize) -> String {
         let over_pdf = r_mm / widest_per_mm / ((-sr).exp() + (-sr / 3.0).exp());
         let (sin, cos) = (i as f64 * GOLDEN_ANGLE).sin_cos();
         // Writing to a String cannot fail.
-        let _ = writeln!(
-            text,
-            "    sample(center, {r_mm:?}, {over_pdf:?}, vec2f({cos:?}, {sin:?}), &sums);"
-        );
+        let _ =
+            writeln!(text, "    sample(center, {r_mm:?}, {over_pdf:?}, vec2f({cos:?}, {sin:?}), &sums);");
     }
     text + "    return sums;\n}\n"
 }

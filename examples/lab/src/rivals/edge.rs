@@ -13,8 +13,7 @@ const SOFT_MM2: f64 = 0.0625;
 
 /// The profile in double precision.
 pub fn terms(profile: &Profile) -> Vec<(f64, DVec3)> {
-    let term =
-        |g: &subsurface::Gaussian| (g.variance_mm2.into(), DVec3::from(g.weight.map(f64::from)));
+    let term = |g: &subsurface::Gaussian| (g.variance_mm2.into(), DVec3::from(g.weight.map(f64::from)));
     profile.gaussians().iter().map(term).collect()
 }
 
@@ -25,10 +24,7 @@ pub fn step(x_mm: f64, variance_mm2: f64) -> f64 {
 
 /// That edge, scattered by a profile.
 pub fn scattered_step(x_mm: f64, blur_mm2: f64, terms: &[(f64, DVec3)]) -> DVec3 {
-    terms
-        .iter()
-        .map(|(v, weight)| *weight * step(x_mm, v + blur_mm2))
-        .sum()
+    terms.iter().map(|(v, weight)| *weight * step(x_mm, v + blur_mm2)).sum()
 }
 
 /// Distances from the edge at which errors are looked for, denser towards it; the other side
@@ -82,21 +78,14 @@ impl Responses {
                 }
             }
         }
-        Self {
-            parts,
-            truth,
-            responses,
-        }
+        Self { parts, truth, responses }
     }
 
     /// The worst error of the kernel Σ cᵢ aᵢ in one channel.
     pub fn worst(&self, c: &[f64], channel: usize) -> f64 {
         let response = |square: &[f64]| -> f64 {
             let row = |row: &[f64]| row.iter().zip(c).map(|(r, c)| r * c).sum::<f64>();
-            c.iter()
-                .zip(square.chunks_exact(self.parts))
-                .map(|(ci, r)| ci * row(r))
-                .sum()
+            c.iter().zip(square.chunks_exact(self.parts)).map(|(ci, r)| ci * row(r)).sum()
         };
         self.responses
             .chunks_exact(self.parts * self.parts)
@@ -142,18 +131,13 @@ fn simplex(f: &impl Fn(&[f64]) -> f64, start: &[f64], spread: f64) -> (Vec<f64>,
         if points[n].1 - points[0].1 < 1e-6 {
             break;
         }
-        let center: Vec<f64> = (0..n)
-            .map(|k| points[..n].iter().map(|p| p.0[k]).sum::<f64>() / n as f64)
-            .collect();
+        let center: Vec<f64> =
+            (0..n).map(|k| points[..n].iter().map(|p| p.0[k]).sum::<f64>() / n as f64).collect();
         let worst = points[n].clone();
         let reflected = valued(blend(&center, &worst.0, -1.0));
         if reflected.1 < points[0].1 {
             let expanded = valued(blend(&center, &worst.0, -2.0));
-            points[n] = if expanded.1 < reflected.1 {
-                expanded
-            } else {
-                reflected
-            };
+            points[n] = if expanded.1 < reflected.1 { expanded } else { reflected };
         } else if reflected.1 < points[n - 1].1 {
             points[n] = reflected;
         } else {
@@ -168,10 +152,7 @@ fn simplex(f: &impl Fn(&[f64]) -> f64, start: &[f64], spread: f64) -> (Vec<f64>,
             }
         }
     }
-    points
-        .into_iter()
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .unwrap_or_default()
+    points.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
 }
 
 /// A WGSL literal of three floats.

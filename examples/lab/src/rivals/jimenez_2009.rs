@@ -8,8 +8,8 @@ use crate::Error;
 use glam::DVec3;
 use subsurface::Frame;
 use subsurface::wgpu::{
-    self, BindGroup, BindingResource, BlendFactor, Color, ColorWrites, CommandEncoder, Device,
-    LoadOp, Queue, Sampler, TextureFormat, TextureView,
+    self, BindGroup, BindingResource, BlendFactor, Color, ColorWrites, CommandEncoder, Device, LoadOp,
+    Queue, Sampler, TextureFormat, TextureView,
 };
 
 use super::copy::Copy;
@@ -63,12 +63,7 @@ impl Jimenez2009 {
                 "a format that can be blended onto",
             ));
         }
-        let shader = [
-            SCREEN,
-            include_str!("seven_taps.wgsl"),
-            include_str!("jimenez_2009.wgsl"),
-        ]
-        .concat();
+        let shader = [SCREEN, include_str!("seven_taps.wgsl"), include_str!("jimenez_2009.wgsl")].concat();
         let slots = [Slot::Uniform, Slot::Filtered, Slot::Sampler, Slot::Uint];
         let sum = Target {
             format,
@@ -102,12 +97,7 @@ impl Jimenez2009 {
             blurs.push(Blur {
                 rows: pass("fs_rows", &[COLOR.into()]),
                 columns: pass("fs_columns", &[COLOR.into(), sum]),
-                share: Color {
-                    r: share.x,
-                    g: share.y,
-                    b: share.z,
-                    a: 1.0,
-                },
+                share: Color { r: share.x, g: share.y, b: share.z, a: 1.0 },
             });
         }
         Ok(Self {
@@ -145,10 +135,7 @@ impl ScreenMethod for Jimenez2009 {
             .iter()
             .map(|blur| (bind(&blur.rows, &inputs.color), bind(&blur.columns, rows)))
             .collect();
-        self.prepared = Some(Prepared {
-            groups,
-            color: inputs.color,
-        });
+        self.prepared = Some(Prepared { groups, color: inputs.color });
         Ok(())
     }
 
@@ -160,11 +147,9 @@ impl ScreenMethod for Jimenez2009 {
         self.copy.render(encoder, output)?;
         for (blur, (row_group, column_group)) in self.blurs.iter().zip(&prepared.groups) {
             let targets = [(rows, CLEAR)];
-            self.packed
-                .draw(encoder, (&blur.rows, row_group), &targets, blur.share);
+            self.packed.draw(encoder, (&blur.rows, row_group), &targets, blur.share);
             let targets = [(&prepared.color, CLEAR), (output, LoadOp::Load)];
-            self.packed
-                .draw(encoder, (&blur.columns, column_group), &targets, blur.share);
+            self.packed.draw(encoder, (&blur.columns, column_group), &targets, blur.share);
         }
         Ok(())
     }

@@ -34,26 +34,15 @@ pub type Atlas = (&'static str, String, Box<dyn AtlasMethod>);
 ///
 /// # Errors
 /// A format that `jimenez_2009` cannot blend onto.
-pub fn screen(
-    device: &Device,
-    format: TextureFormat,
-    profile: &Profile,
-) -> Result<Vec<Screen>, Error> {
-    let mut methods: Vec<Screen> = vec![(
-        "copy",
-        String::new(),
-        Box::new(copy::Copy::new(device, format)),
-    )];
+pub fn screen(device: &Device, format: TextureFormat, profile: &Profile) -> Result<Vec<Screen>, Error> {
+    let mut methods: Vec<Screen> = vec![("copy", String::new(), Box::new(copy::Copy::new(device, format)))];
     if *profile == Profile::SKIN {
         let method = jimenez_2009::Jimenez2009::new(device, format)?;
         methods.push(("jimenez_2009", String::new(), Box::new(method)));
     }
     for pairs in [5, 8, 12] {
         for (name, kernel) in [
-            (
-                "jimenez_separable",
-                separable::published_kernel(profile, pairs),
-            ),
+            ("jimenez_separable", separable::published_kernel(profile, pairs)),
             ("fitted_separable", separable::fitted_kernel(profile, pairs)),
         ] {
             let method = separable::Separable::new(device, format, &kernel);
@@ -75,14 +64,8 @@ pub fn atlas(device: &Device, format: TextureFormat, profile: &Profile) -> Vec<A
         (
             "texture_cascade",
             String::new(),
-            Box::new(texture_cascade::TextureCascade::new(
-                device, format, profile,
-            )),
+            Box::new(texture_cascade::TextureCascade::new(device, format, profile)),
         ),
-        (
-            "texture_2d",
-            String::new(),
-            Box::new(texture_2d::Texture2d::new(device, format, profile)),
-        ),
+        ("texture_2d", String::new(), Box::new(texture_2d::Texture2d::new(device, format, profile))),
     ]
 }

@@ -85,8 +85,7 @@ impl Packed {
     }
 
     pub fn prepare(&mut self, device: &Device, frame: &Frame) -> Result<Inputs, Error> {
-        let (Some(profile_id), None, None) = (frame.profile_id, frame.strength, frame.viewport)
-        else {
+        let (Some(profile_id), None, None) = (frame.profile_id, frame.strength, frame.viewport) else {
             return Err(Error::new(
                 "frame",
                 "no profile_id, or a strength or viewport",
@@ -119,11 +118,7 @@ impl Packed {
             rest: self.rest.bind(device, &[texture(frame.irradiance)]),
         });
         let [color, surface, _] = self.scratch.insert(views).clone();
-        Ok(Inputs {
-            frame: uniform,
-            color,
-            surface,
-        })
+        Ok(Inputs { frame: uniform, color, surface })
     }
 
     pub fn render(&self, encoder: &mut CommandEncoder) {
@@ -147,21 +142,10 @@ impl Packed {
     }
 
     /// A method's last pass over skin, and the light as it was elsewhere.
-    pub fn finish(
-        &self,
-        encoder: &mut CommandEncoder,
-        pass: (&Pass, &BindGroup),
-        output: &TextureView,
-    ) {
+    pub fn finish(&self, encoder: &mut CommandEncoder, pass: (&Pass, &BindGroup), output: &TextureView) {
         if let (Some(prepared), Some([.., stencil])) = (&self.prepared, &self.scratch) {
             let draws = [pass, (&self.rest, &prepared.rest)];
-            pass::draw(
-                encoder,
-                &draws,
-                &[(output, CLEAR)],
-                Some(stencil),
-                Color::BLACK,
-            );
+            pass::draw(encoder, &draws, &[(output, CLEAR)], Some(stencil), Color::BLACK);
         }
     }
 }
@@ -192,16 +176,9 @@ fn uniform(frame: &Frame, profile_id: &wgpu::TextureView) -> Result<[Vec4; 2], E
         ));
     }
     if !mm.is_finite() || mm <= 0.0 {
-        return Err(Error::new(
-            "mm_per_unit",
-            mm.to_string(),
-            "a finite number above 0",
-        ));
+        return Err(Error::new("mm_per_unit", mm.to_string(), "a finite number above 0"));
     }
     let x = 2.0 / (size[0] as f32 * p.x_axis.x);
     let y = 2.0 / (size[1] as f32 * p.y_axis.y);
-    Ok([
-        Vec4::new(z.w * mm, w.w * mm, w.z, z.z),
-        Vec4::new(x * w.w * mm, x * w.z, y * w.w * mm, y * w.z),
-    ])
+    Ok([Vec4::new(z.w * mm, w.w * mm, w.z, z.z), Vec4::new(x * w.w * mm, x * w.z, y * w.w * mm, y * w.z)])
 }

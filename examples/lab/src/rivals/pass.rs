@@ -2,8 +2,8 @@
 
 use subsurface::wgpu::{
     self, BindGroup, BindGroupLayout, BindingResource, BindingType, BlendState, Color, ColorWrites,
-    CommandEncoder, Device, LoadOp, RenderPipeline, SamplerBindingType, TextureFormat,
-    TextureSampleType, TextureView,
+    CommandEncoder, Device, LoadOp, RenderPipeline, SamplerBindingType, TextureFormat, TextureSampleType,
+    TextureView,
 };
 
 /// What a binding is; a pass numbers its bindings from 0 in their order.
@@ -28,11 +28,7 @@ pub struct Target {
 
 impl From<TextureFormat> for Target {
     fn from(format: TextureFormat) -> Self {
-        Self {
-            format,
-            blend: None,
-            writes: ColorWrites::ALL,
-        }
+        Self { format, blend: None, writes: ColorWrites::ALL }
     }
 }
 
@@ -62,21 +58,12 @@ impl Over {
             Self::Skin => (CompareFunction::Equal, StencilOperation::Keep),
             Self::Rest => (CompareFunction::NotEqual, StencilOperation::Keep),
         };
-        let face = wgpu::StencilFaceState {
-            compare,
-            pass_op,
-            ..Default::default()
-        };
+        let face = wgpu::StencilFaceState { compare, pass_op, ..Default::default() };
         Some(wgpu::DepthStencilState {
             format: STENCIL,
             depth_write_enabled: None,
             depth_compare: None,
-            stencil: wgpu::StencilState {
-                front: face,
-                back: face,
-                read_mask: 0xff,
-                write_mask: 0xff,
-            },
+            stencil: wgpu::StencilState { front: face, back: face, read_mask: 0xff, write_mask: 0xff },
             bias: Default::default(),
         })
     }
@@ -162,21 +149,13 @@ impl Pass {
             fragment: Some(wgpu::FragmentState {
                 module: &module,
                 entry_point: Some(entry_point),
-                compilation_options: wgpu::PipelineCompilationOptions {
-                    constants,
-                    ..Default::default()
-                },
+                compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
                 targets: &targets,
             }),
             multiview_mask: None,
             cache: None,
         });
-        Self {
-            label: label.into(),
-            over,
-            layout,
-            pipeline,
-        }
+        Self { label: label.into(), over, layout, pipeline }
     }
 
     /// Binds the resources, in the order of the slots.
@@ -184,10 +163,7 @@ impl Pass {
         let entries: Vec<_> = resources
             .iter()
             .zip(0..)
-            .map(|(resource, binding)| wgpu::BindGroupEntry {
-                binding,
-                resource: resource.clone(),
-            })
+            .map(|(resource, binding)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
             .collect();
         device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(&self.label),
@@ -219,10 +195,7 @@ pub fn draw(
                 view,
                 depth_slice: None,
                 resolve_target: None,
-                ops: wgpu::Operations {
-                    load,
-                    store: wgpu::StoreOp::Store,
-                },
+                ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
             })
         })
         .collect();
@@ -234,10 +207,8 @@ pub fn draw(
         depth_stencil_attachment: stencil.map(|view| wgpu::RenderPassDepthStencilAttachment {
             view,
             depth_ops: None,
-            stencil_ops: marks.then_some(wgpu::Operations {
-                load: LoadOp::Clear(0),
-                store: wgpu::StoreOp::Store,
-            }),
+            stencil_ops: marks
+                .then_some(wgpu::Operations { load: LoadOp::Clear(0), store: wgpu::StoreOp::Store }),
         }),
         ..Default::default()
     });
@@ -311,11 +282,7 @@ pub fn texture(device: &Device, label: &str, size: [u32; 2], format: TextureForm
     device
         .create_texture(&wgpu::TextureDescriptor {
             label: Some(label),
-            size: wgpu::Extent3d {
-                width: size[0],
-                height: size[1],
-                depth_or_array_layers: 1,
-            },
+            size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
             mip_level_count: 1,
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,

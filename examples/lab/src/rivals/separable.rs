@@ -9,8 +9,7 @@ use std::fmt::Write;
 use crate::Error;
 use glam::DVec3;
 use subsurface::wgpu::{
-    BindGroup, BindingResource, Color, CommandEncoder, Device, Queue, Sampler, TextureFormat,
-    TextureView,
+    BindGroup, BindingResource, Color, CommandEncoder, Device, Queue, Sampler, TextureFormat, TextureView,
 };
 use subsurface::{Frame, Profile};
 
@@ -54,8 +53,7 @@ pub fn published_kernel(profile: &Profile, pairs: usize) -> Kernel {
         let mut weights = vec![DVec3::ZERO; pairs + 1];
         let mut worst: f64 = 0.0;
         for channel in 0..3 {
-            let column =
-                |p: &[f64]| published_weights(pairs, range, p[0].exp(), p[1].clamp(0.0, 1.0));
+            let column = |p: &[f64]| published_weights(pairs, range, p[0].exp(), p[1].clamp(0.0, 1.0));
             let error = |p: &[f64]| responses.worst(&column(p), channel);
             let starts = [[0.0, 0.9], [-1.0, 0.5], [-2.0, 0.3]];
             let (best, least) = starts
@@ -68,12 +66,7 @@ pub fn published_kernel(profile: &Profile, pairs: usize) -> Kernel {
                 to[channel] = from;
             }
         }
-        Kernel {
-            offsets_mm,
-            weights,
-            width_mm,
-            worst,
-        }
+        Kernel { offsets_mm, weights, width_mm, worst }
     };
     best_width(profile, fit)
 }
@@ -81,18 +74,11 @@ pub fn published_kernel(profile: &Profile, pairs: usize) -> Kernel {
 /// One channel of the demo's kernel at a falloff and a strength, pairs together.
 fn published_weights(pairs: usize, range: f64, falloff: f64, strength: f64) -> Vec<f64> {
     // Red of the skin profile, variances in units of the kernel.
-    const RED: [(f64, f64); 5] = [
-        (0.0484, 0.100),
-        (0.187, 0.118),
-        (0.567, 0.113),
-        (1.99, 0.358),
-        (7.41, 0.078),
-    ];
+    const RED: [(f64, f64); 5] =
+        [(0.0484, 0.100), (0.187, 0.118), (0.567, 0.113), (1.99, 0.358), (7.41, 0.078)];
     let profile = |x: f64| -> f64 {
         let r = x / (0.001 + falloff);
-        RED.iter()
-            .map(|(v, w)| w * (-r * r / (2.0 * v)).exp() / (2.0 * std::f64::consts::PI * v))
-            .sum()
+        RED.iter().map(|(v, w)| w * (-r * r / (2.0 * v)).exp() / (2.0 * std::f64::consts::PI * v)).sum()
     };
     let o = offsets(pairs, range);
     let gap = |k: usize| match k {
@@ -133,12 +119,7 @@ pub fn fitted_kernel(profile: &Profile, pairs: usize) -> Kernel {
                 responses.worst(&column, channel)
             })
             .fold(0.0, f64::max);
-        Kernel {
-            offsets_mm,
-            weights,
-            width_mm,
-            worst,
-        }
+        Kernel { offsets_mm, weights, width_mm, worst }
     };
     best_width(profile, fit)
 }
@@ -149,9 +130,7 @@ pub fn fitted_kernel(profile: &Profile, pairs: usize) -> Kernel {
 /// worst error of each color on the edges that they were fitted on.
 pub fn line_mixture(profile: &Profile) -> (Vec<(f64, DVec3)>, DVec3) {
     let terms = terms(profile);
-    let start: Vec<_> = std::iter::once((0.0, DVec3::ZERO))
-        .chain(terms.iter().copied())
-        .collect();
+    let start: Vec<_> = std::iter::once((0.0, DVec3::ZERO)).chain(terms.iter().copied()).collect();
     let variances_mm2: Vec<_> = start.iter().map(|(v, _)| *v).collect();
     let responses = Responses::of_gaussians(&terms, &variances_mm2);
     // Shares of squares are at least 0 and sum to 1.
@@ -190,9 +169,7 @@ fn best_width(profile: &Profile, fit: impl Fn(f64) -> Kernel) -> Kernel {
 /// The demo's offsets, denser towards the center: sgn(o)·o²/R with o evenly from −R to R; here
 /// those from 0 to `reach` = R.
 fn offsets(pairs: usize, reach: f64) -> Vec<f64> {
-    (0..=pairs)
-        .map(|k| reach * (k as f64 / pairs as f64).powi(2))
-        .collect()
+    (0..=pairs).map(|k| reach * (k as f64 / pairs as f64).powi(2)).collect()
 }
 
 /// A separable kernel, passed along rows and then along columns.
@@ -209,13 +186,7 @@ pub struct Separable {
 impl Separable {
     pub fn new(device: &Device, format: TextureFormat, kernel: &Kernel) -> Self {
         let shader = [SCREEN, include_str!("separable.wgsl"), &kernel.wgsl()].concat();
-        let slots = [
-            Slot::Uniform,
-            Slot::Filtered,
-            Slot::Sampler,
-            Slot::Uint,
-            Slot::Float,
-        ];
+        let slots = [Slot::Uniform, Slot::Filtered, Slot::Sampler, Slot::Uint, Slot::Float];
         let pass = |entry_point, target: TextureFormat| {
             let label = format!("rivals separable {entry_point}");
             let shader = (shader.as_str(), entry_point);
@@ -282,10 +253,8 @@ impl ScreenMethod for Separable {
         if let (Some([rows]), Some((row_group, column_group))) = (&self.scratch, &self.prepared) {
             self.packed.render(encoder);
             let targets = [(rows, CLEAR)];
-            self.packed
-                .draw(encoder, (&self.rows, row_group), &targets, Color::BLACK);
-            self.packed
-                .finish(encoder, (&self.columns, column_group), output);
+            self.packed.draw(encoder, (&self.rows, row_group), &targets, Color::BLACK);
+            self.packed.finish(encoder, (&self.columns, column_group), output);
         }
         Ok(())
     }

@@ -74,8 +74,7 @@ impl View {
     fn facing(&self, depth_mm: f64) -> impl Iterator<Item = DVec2> {
         let p = self.projection.as_dmat4();
         let w = p.z_axis.w * -depth_mm + p.w_axis.w;
-        self.ndc()
-            .map(move |ndc| ndc * w / DVec2::new(p.x_axis.x, p.y_axis.y))
+        self.ndc().map(move |ndc| ndc * w / DVec2::new(p.x_axis.x, p.y_axis.y))
     }
 
     fn scatter(&self, method: &mut dyn ScreenMethod, hits: &[Hit]) -> Vec<[f32; 4]> {
@@ -121,21 +120,14 @@ fn constant_light_stays_constant_and_background_as_it_was() {
     // Values that a half float holds exactly, so that background comes out bit for bit.
     let skin = DVec3::new(0.75, 0.5, 0.25);
     let behind = DVec3::new(4.0, 8.0, 2.0);
-    for view in [
-        View::perspective([240, 160], [2.0, 3.0]),
-        View::orthographic([240, 160], 4.0),
-    ] {
+    for view in [View::perspective([240, 160], [2.0, 3.0]), View::orthographic([240, 160], 4.0)] {
         let hits: Vec<_> = view
             .ndc()
             .map(|at| {
                 let hole = (9.0 * at.x).sin() * (7.0 * at.y).sin() > 0.5;
                 let layer = if at.x > 0.6 { 30.0 } else { 0.0 };
                 Hit {
-                    depth_mm: if hole {
-                        1e6
-                    } else {
-                        90.0 + 12.0 * at.x - layer
-                    },
+                    depth_mm: if hole { 1e6 } else { 90.0 + 12.0 * at.x - layer },
                     irradiance: if hole { behind } else { skin },
                     id: u8::from(!hole),
                 }
@@ -168,11 +160,7 @@ fn edge_error(method: &mut dyn ScreenMethod, px_per_mm: f64, degrees: f64) -> (f
     let points: Vec<_> = view.facing(300.0).collect();
     let hits: Vec<_> = points
         .iter()
-        .map(|p| Hit {
-            depth_mm: 300.0,
-            irradiance: DVec3::splat(step(p.dot(across), soft_mm2)),
-            id: 1,
-        })
+        .map(|p| Hit { depth_mm: 300.0, irradiance: DVec3::splat(step(p.dot(across), soft_mm2)), id: 1 })
         .collect();
     let out = view.scatter(method, &hits);
     let skin = terms(&Profile::SKIN);
@@ -218,11 +206,7 @@ fn width_mm(method: &mut dyn ScreenMethod, view: &View, depth_mm: f64, axis: usi
     let points: Vec<_> = view.facing(depth_mm).collect();
     let hits: Vec<_> = points
         .iter()
-        .map(|p| Hit {
-            depth_mm,
-            irradiance: DVec3::splat(step(p[axis], SOFT_MM2)),
-            id: 1,
-        })
+        .map(|p| Hit { depth_mm, irradiance: DVec3::splat(step(p[axis], SOFT_MM2)), id: 1 })
         .collect();
     let out = view.scatter(method, &hits);
     // The mean along the edge, away from the frame's own.
@@ -245,8 +229,7 @@ fn width_mm(method: &mut dyn ScreenMethod, view: &View, depth_mm: f64, axis: usi
             .windows(2)
             .find_map(|w| {
                 let (a, b) = (w[0].1 / w[0].2, w[1].1 / w[1].2);
-                (a <= level && level < b)
-                    .then(|| w[0].0 + (w[1].0 - w[0].0) * (level - a) / (b - a))
+                (a <= level && level < b).then(|| w[0].0 + (w[1].0 - w[0].0) * (level - a) / (b - a))
             })
             .expect("red crosses every level")
     };
@@ -309,12 +292,7 @@ fn kernels_are_as_near_to_skin_as_they_get() {
 
     let (shape, disk) = super::burley_disk::fitted_shape(&Profile::SKIN);
     println!("Burley's s {shape:.3} in 1/mm: off by {disk:.4}");
-    assert!(
-        (shape - DVec3::new(2.421, 7.909, 11.762))
-            .abs()
-            .max_element()
-            < 0.01
-    );
+    assert!((shape - DVec3::new(2.421, 7.909, 11.762)).abs().max_element() < 0.01);
 
     for pairs in [5, 8, 12] {
         let published = super::separable::published_kernel(&Profile::SKIN, pairs);
@@ -335,11 +313,7 @@ fn kernels_are_as_near_to_skin_as_they_get() {
 /// A texel's position in mm and its irradiance; `None` off the islands.
 type Texel = Option<(DVec3, DVec3)>;
 
-fn scatter_atlas(
-    method: &mut dyn AtlasMethod,
-    size: u32,
-    texel: impl Fn(DVec2) -> Texel,
-) -> Vec<[f32; 4]> {
+fn scatter_atlas(method: &mut dyn AtlasMethod, size: u32, texel: impl Fn(DVec2) -> Texel) -> Vec<[f32; 4]> {
     let gpu = gpu();
     let (mut irradiance, mut positions) = (Vec::new(), Vec::new());
     for t in texels(size) {
@@ -372,9 +346,7 @@ fn atlas_rivals_keep_constant_light_and_fill_the_gutter() {
     let e = DVec3::new(0.75, 0.5, 0.25);
     let inside = |t: DVec2| (t - 32.0).abs().max_element() < 16.0;
     for (name, _, mut method) in super::atlas(&gpu().device, FORMAT, &Profile::SKIN) {
-        let out = scatter_atlas(&mut *method, size, |t| {
-            inside(t).then(|| ((t * 0.2).extend(0.0), e))
-        });
+        let out = scatter_atlas(&mut *method, size, |t| inside(t).then(|| ((t * 0.2).extend(0.0), e)));
         for (found, t) in out.iter().zip(texels(size)) {
             let outside = (t - 32.0).abs().max_element() - 16.0;
             if outside < 4.0 {

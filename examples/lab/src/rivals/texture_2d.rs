@@ -55,10 +55,7 @@ impl Texture2d {
             source: Pass::new(
                 device,
                 "rivals texture_2d source",
-                (
-                    &[ATLAS, include_str!("texture_2d_source.wgsl")].concat(),
-                    "fs_source",
-                ),
+                (&[ATLAS, include_str!("texture_2d_source.wgsl")].concat(), "fs_source"),
                 &[Slot::Uniform, Slot::Float, Slot::Float],
                 &[SOURCE.into()],
                 &[],
@@ -80,33 +77,22 @@ impl AtlasMethod for Texture2d {
         let views = scratch(device, label, self.scratch.take(), size, formats);
         let [source, even, odd] = &*self.scratch.insert(views);
         let bind = |pass: &Pass, textures: &[&TextureView]| {
-            let mut resources = vec![
-                uniform.as_entire_binding(),
-                BindingResource::TextureView(atlas.positions),
-            ];
+            let mut resources =
+                vec![uniform.as_entire_binding(), BindingResource::TextureView(atlas.positions)];
             resources.extend(textures.iter().map(|v| BindingResource::TextureView(v)));
             pass.bind(device, &resources)
         };
         let before = [even, odd].into_iter().cycle();
-        let sums = self
-            .sums
-            .iter()
-            .zip(before)
-            .map(|(pass, before)| bind(pass, &[source, before]))
-            .collect();
-        let last = if self.sums.len().is_multiple_of(2) {
-            even
-        } else {
-            odd
-        };
+        let sums =
+            self.sums.iter().zip(before).map(|(pass, before)| bind(pass, &[source, before])).collect();
+        let last = if self.sums.len().is_multiple_of(2) { even } else { odd };
         self.gutter.prepare(device, last, atlas);
         self.prepared = Some((bind(&self.source, &[atlas.irradiance]), sums));
         Ok(())
     }
 
     fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
-        let (Some([source, even, odd]), Some((source_group, groups))) =
-            (&self.scratch, &self.prepared)
+        let (Some([source, even, odd]), Some((source_group, groups))) = (&self.scratch, &self.prepared)
         else {
             return Ok(());
         };

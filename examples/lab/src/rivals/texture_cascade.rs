@@ -45,12 +45,8 @@ impl TextureCascade {
     pub fn new(device: &Device, format: TextureFormat, profile: &Profile) -> Self {
         let mut terms = terms(profile);
         terms.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let shader = [
-            TRIANGLE,
-            include_str!("seven_taps.wgsl"),
-            include_str!("texture_cascade.wgsl"),
-        ]
-        .concat();
+        let shader =
+            [TRIANGLE, include_str!("seven_taps.wgsl"), include_str!("texture_cascade.wgsl")].concat();
         let mut before_mm2 = 0.0;
         let mut blurs = Vec::new();
         for (variance_mm2, _) in &terms {
@@ -73,10 +69,7 @@ impl TextureCascade {
             pack: Pass::new(
                 device,
                 "rivals texture_cascade pack",
-                (
-                    &[ATLAS, include_str!("texture_cascade_pack.wgsl")].concat(),
-                    "fs_pack",
-                ),
+                (&[ATLAS, include_str!("texture_cascade_pack.wgsl")].concat(), "fs_pack"),
                 &[Slot::Uniform, Slot::Float, Slot::Float],
                 &[COLOR.into(), STRETCH.into()],
                 &[],
@@ -104,10 +97,7 @@ fn sum_wgsl(weights: &[DVec3]) -> String {
     let mut text = TRIANGLE.to_string();
     // Writing to a String cannot fail.
     for i in 0..weights.len() {
-        let _ = writeln!(
-            text,
-            "@group(0) @binding({i}) var blur_{i}: texture_2d<f32>;"
-        );
+        let _ = writeln!(text, "@group(0) @binding({i}) var blur_{i}: texture_2d<f32>;");
     }
     text += "@fragment\n\
              fn fs_sum(@builtin(position) at: vec4f) -> @location(0) vec4f {\n    \
@@ -131,15 +121,8 @@ impl AtlasMethod for TextureCascade {
         let label = "rivals texture_cascade";
         let formats = [COLOR, STRETCH, COLOR];
         let views = scratch(device, label, self.scratch.take(), size, formats);
-        if self
-            .blurred
-            .first()
-            .is_none_or(|v| super::pass::size(v) != size)
-        {
-            let blurred = self
-                .blurs
-                .iter()
-                .map(|_| texture(device, label, size, COLOR));
+        if self.blurred.first().is_none_or(|v| super::pass::size(v) != size) {
+            let blurred = self.blurs.iter().map(|_| texture(device, label, size, COLOR));
             self.blurred = blurred.collect();
         }
         let [color, stretch, rows] = self.scratch.insert(views);
@@ -160,11 +143,7 @@ impl AtlasMethod for TextureCascade {
             .zip(sources)
             .map(|((u, v), source)| (bind(u, source), bind(v, rows)))
             .collect();
-        let blurred: Vec<_> = self
-            .blurred
-            .iter()
-            .map(BindingResource::TextureView)
-            .collect();
+        let blurred: Vec<_> = self.blurred.iter().map(BindingResource::TextureView).collect();
         self.gutter.prepare(device, rows, atlas);
         self.prepared = Some(Prepared {
             pack: self.pack.bind(

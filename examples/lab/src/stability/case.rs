@@ -29,16 +29,8 @@ pub const OURS: [&str; 3] = [EXACT, PLAN, ATLAS];
 pub const INPUT: &str = "input";
 
 /// What cases are about, in the order of the page.
-pub const GROUPS: [&str; 8] = [
-    "screen space",
-    "ids and pixels",
-    "texture space",
-    "time",
-    "numbers",
-    "sizes",
-    "hosts",
-    "files",
-];
+pub const GROUPS: [&str; 8] =
+    ["screen space", "ids and pixels", "texture space", "time", "numbers", "sizes", "hosts", "files"];
 
 /// A figure for each method; methods that a case does not apply to are left out.
 pub type Figures = Vec<(&'static str, f64)>;
@@ -139,10 +131,7 @@ impl Case {
 
     /// Whether it has a picture; not where that would show the same as others do.
     pub fn pictured(self, is_pictured: bool) -> Self {
-        Self {
-            is_pictured,
-            ..self
-        }
+        Self { is_pictured, ..self }
     }
 
     pub fn title(&self) -> String {
@@ -163,28 +152,17 @@ impl Case {
 
 /// A method of ours that does not pass, though another could.
 pub fn known(method: &'static str, at_most: f64, why: &'static str) -> Known {
-    Known {
-        method,
-        at_most,
-        by_nature: false,
-        why,
-    }
+    Known { method, at_most, by_nature: false, why }
 }
 
 /// A method of ours that cannot pass with the inputs that it has.
 pub fn by_nature(method: &'static str, at_most: f64, why: &'static str) -> Known {
-    Known {
-        by_nature: true,
-        ..known(method, at_most, why)
-    }
+    Known { by_nature: true, ..known(method, at_most, why) }
 }
 
 impl From<Figures> for Outcome {
     fn from(figures: Figures) -> Self {
-        Self {
-            figures,
-            shown: None,
-        }
+        Self { figures, shown: None }
     }
 }
 
@@ -206,11 +184,7 @@ impl Judged {
     /// Methods of ours that are worse than they are known to be, or that are known and have no figure.
     pub fn worse(&self) -> Vec<String> {
         let title = self.case.title();
-        let missing = self
-            .case
-            .known
-            .iter()
-            .filter(|k| self.figure(k.method).is_none());
+        let missing = self.case.known.iter().filter(|k| self.figure(k.method).is_none());
         let missing = missing.map(|k| format!("{title}: {} has no figure", k.method));
         let ours = OURS.into_iter().chain([INPUT]);
         let worse = ours.filter_map(|method| {
@@ -218,8 +192,7 @@ impl Judged {
             let known = self.case.known.iter().find(|k| k.method == method);
             let at_most = known.map_or(self.case.bound.passes, |k| k.at_most);
             let holds = figure <= at_most || at_most == f64::INFINITY;
-            (!holds)
-                .then(|| format!("{title}: {method} is at {figure:.5}, needs {at_most:.5} or less"))
+            (!holds).then(|| format!("{title}: {method} is at {figure:.5}, needs {at_most:.5} or less"))
         });
         worse.chain(missing).collect()
     }
@@ -232,8 +205,8 @@ impl Judged {
                 .filter(move |(m, _)| OURS.contains(m) == ours && !["none", INPUT].contains(m))
                 .map(|(_, f)| self.case.verdict(*f))
         };
-        let rivals_fail_alone = verdicts(true).all(|v| v == Verdict::Passes)
-            && verdicts(false).any(|v| v == Verdict::Fails);
+        let rivals_fail_alone =
+            verdicts(true).all(|v| v == Verdict::Passes) && verdicts(false).any(|v| v == Verdict::Fails);
         self.case.is_pictured
             && self.outcome.shown.is_some()
             && (rivals_fail_alone || self.shortcomings().next().is_some())

@@ -49,14 +49,10 @@ impl Texels {
         let background = DVec3::splat(background);
         Self {
             size: g.view.size,
-            irradiance: hits()
-                .map(|h| light(h.map_or(background, |h| h.irradiance)))
-                .collect(),
+            irradiance: hits().map(|h| light(h.map_or(background, |h| h.irradiance))).collect(),
             depth: hits().map(|h| h.map_or(0.0, |h| depth(h.point))).collect(),
             profile_id: hits().map(|h| h.map_or(0, |h| h.id as u8)).collect(),
-            positions_mm: hits()
-                .map(|h| h.map_or([0.0; 4], |h| position(h.point)))
-                .collect(),
+            positions_mm: hits().map(|h| h.map_or([0.0; 4], |h| position(h.point))).collect(),
             projection: g.view.projection.as_mat4(),
             mm_per_unit: 1.0,
         }
@@ -83,13 +79,10 @@ impl Texels {
     pub fn upload(&self, gpu: &Gpu) -> Uploaded {
         let (size, unit) = (self.size, self.mm_per_unit);
         let positions = self.positions_mm.iter();
-        let positions: Vec<_> = positions
-            .map(|[x, y, z, id]| [x / unit, y / unit, z / unit, *id])
-            .collect();
+        let positions: Vec<_> =
+            positions.map(|[x, y, z, id]| [x / unit, y / unit, z / unit, *id]).collect();
         let halves = self.irradiance.iter();
-        let halves: Vec<_> = halves
-            .map(|e| e.map(|c| f16::from_f32(c).to_bits()))
-            .collect();
+        let halves: Vec<_> = halves.map(|e| e.map(|c| f16::from_f32(c).to_bits())).collect();
         let full = TextureFormat::Rgba32Float;
         Uploaded {
             irradiance: gpu.upload("irradiance", size, TextureFormat::Rgba16Float, &halves),
@@ -113,10 +106,6 @@ impl Uploaded {
     }
 
     pub fn atlas(&self) -> Atlas<'_> {
-        Atlas {
-            irradiance: &self.irradiance,
-            positions: &self.positions,
-            mm_per_unit: self.mm_per_unit,
-        }
+        Atlas { irradiance: &self.irradiance, positions: &self.positions, mm_per_unit: self.mm_per_unit }
     }
 }

@@ -88,12 +88,7 @@ impl Lab {
             }
         }));
         let plan = Plan::new(&[Profile::SKIN], DEFAULT_MAX_ERROR)?;
-        Ok(Self {
-            methods: RefCell::new(methods(&gpu, &plan)?),
-            gpu,
-            plan,
-            complaints,
-        })
+        Ok(Self { methods: RefCell::new(methods(&gpu, &plan)?), gpu, plan, complaints })
     }
 
     /// What every method in screen space makes of a frame of skin; the first does nothing.

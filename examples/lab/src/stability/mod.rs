@@ -33,11 +33,7 @@ pub fn main() -> ExitCode {
     for error in &errors {
         eprintln!("error: {error}");
     }
-    if errors.is_empty() {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
-    }
+    if errors.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
 /// Runs the cases and writes what came out; what is worse than it is known to be, a line each.
@@ -58,18 +54,10 @@ fn atlas(options: &Options) -> Result<Vec<String>, Error> {
     }
     judged.sort_by_key(|j| GROUPS.iter().position(|group| *group == j.case.group));
     let command = std::env::args().skip(1).collect::<Vec<_>>().join(" ");
-    let report = Report {
-        judged: &judged,
-        adapter: &lab.gpu.adapter,
-        command: &command,
-    };
+    let report = Report { judged: &judged, adapter: &lab.gpu.adapter, command: &command };
     report.write(&options.out)?;
     let page = options.out.join("failures.md");
-    println!(
-        "{} in {:.0} s",
-        page.display(),
-        started.elapsed().as_secs_f64()
-    );
+    println!("{} in {:.0} s", page.display(), started.elapsed().as_secs_f64());
     Ok(judged.iter().flat_map(Judged::worse).collect())
 }
 
@@ -77,9 +65,5 @@ fn judge(case: Case, lab: &Lab) -> Result<Judged, Error> {
     let since = Instant::now();
     let outcome = (case.run)(lab).map_err(|error| error.within(case.title()))?;
     lab.check(&case.title())?;
-    Ok(Judged {
-        case,
-        outcome,
-        took: since.elapsed(),
-    })
+    Ok(Judged { case, outcome, took: since.elapsed() })
 }

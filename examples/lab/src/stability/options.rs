@@ -28,17 +28,12 @@ impl Options {
     pub fn parse() -> Result<Option<Self>, Error> {
         use lexopt::prelude::*;
 
-        let mut options = Self {
-            quick: false,
-            only: None,
-            out: "out/stability".into(),
-        };
+        let mut options = Self { quick: false, only: None, out: "out/stability".into() };
         let refused = |e: lexopt::Error| {
             let got = format!("\"{e}\"");
             Error::new("command line", got, "options as --help lists them")
         };
-        let text =
-            |parser: &mut lexopt::Parser| parser.value().and_then(|v| v.string()).map_err(refused);
+        let text = |parser: &mut lexopt::Parser| parser.value().and_then(|v| v.string()).map_err(refused);
         let mut parser = lexopt::Parser::from_env();
         while let Some(arg) = parser.next().map_err(refused)? {
             match arg {

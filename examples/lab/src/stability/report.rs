@@ -30,9 +30,7 @@ impl Report<'_> {
             if let Some(picture) = strip(judged, &rasteriser)? {
                 let mut jpeg = Vec::new();
                 let made = JpegEncoder::new_with_quality(&mut jpeg, 80).encode_image(&picture);
-                made.map_err(|e| {
-                    Error::new(picture_name(judged), e, "a picture that can be encoded")
-                })?;
+                made.map_err(|e| Error::new(picture_name(judged), e, "a picture that can be encoded"))?;
                 images.push((picture_name(judged), jpeg));
             }
         }
@@ -47,24 +45,13 @@ impl Report<'_> {
             "" => String::new(),
             options => format!(" -- {options}"),
         };
-        let mut page = INTRODUCTION
-            .replace("OPTIONS", &options)
-            .replace("ADAPTER", self.adapter);
+        let mut page = INTRODUCTION.replace("OPTIONS", &options).replace("ADAPTER", self.adapter);
         for group in GROUPS {
-            let rows: Vec<&Judged> = self
-                .judged
-                .iter()
-                .filter(|j| j.case.group == group)
-                .collect();
+            let rows: Vec<&Judged> = self.judged.iter().filter(|j| j.case.group == group).collect();
             if rows.is_empty() {
                 continue;
             }
-            let _ = write!(
-                page,
-                "\n## {}{}\n\n",
-                group[..1].to_uppercase(),
-                &group[1..]
-            );
+            let _ = write!(page, "\n## {}{}\n\n", group[..1].to_uppercase(), &group[1..]);
             page += &table(&rows);
             for family in rows.chunk_by(|a, b| a.case.what == b.case.what) {
                 let names: Vec<&str> = family.iter().map(|j| j.case.name.as_str()).collect();
@@ -86,19 +73,14 @@ impl Report<'_> {
 
 fn picture_name(judged: &Judged) -> String {
     let title = judged.case.title();
-    let words = title
-        .split(|c: char| !c.is_alphanumeric())
-        .filter(|w| !w.is_empty());
+    let words = title.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
     format!("failures-{}.jpg", words.collect::<Vec<_>>().join("-"))
 }
 
 fn table(rows: &[&Judged]) -> String {
     let mut used: Vec<&str> = METHODS.into_iter().chain([INPUT]).collect();
     used.retain(|m| rows.iter().any(|row| row.figure(m).is_some()));
-    let mut text = format!(
-        "| | passes | degraded | {} |\n|---|---|---|",
-        used.join(" | ")
-    );
+    let mut text = format!("| | passes | degraded | {} |\n|---|---|---|", used.join(" | "));
     text += &"---|".repeat(used.len());
     for Judged { case, outcome, .. } in rows {
         let [passes, degrades] = [case.bound.passes, case.bound.degrades].map(short);
@@ -138,17 +120,8 @@ fn reasons(rows: &[&Judged]) -> String {
         }
     }
     let mut text = String::new();
-    for Bound {
-        passes,
-        degrades,
-        why,
-    } in bounds
-    {
-        text += &wrapped(&format!(
-            "- ≤ {}, ≤ {}: {why}",
-            short(passes),
-            short(degrades)
-        ));
+    for Bound { passes, degrades, why } in bounds {
+        text += &wrapped(&format!("- ≤ {}, ≤ {}: {why}", short(passes), short(degrades)));
     }
     for (Known { by_nature, why, .. }, methods, names) in reasons {
         let nature = if by_nature { ", by nature" } else { "" };
@@ -164,11 +137,7 @@ fn wrapped(text: &str) -> String {
     let mut column = 0;
     for word in text.split(' ') {
         let length = word.chars().count() + 1;
-        column = if column + length < 110 {
-            column + length
-        } else {
-            length
-        };
+        column = if column + length < 110 { column + length } else { length };
         lines += if column == length { "\n" } else { " " };
         lines += word;
     }

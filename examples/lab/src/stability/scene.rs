@@ -14,18 +14,9 @@ const SPHERE_ENDS: f64 = 2.5;
 
 pub enum Form {
     /// With its UVs along these, which are at right angles.
-    Plane {
-        along: DVec3,
-        down: DVec3,
-        size_mm: DVec2,
-    },
+    Plane { along: DVec3, down: DVec3, size_mm: DVec2 },
     /// Endless; `length_mm` of it is unrolled, its middle turned from the camera by so many radians.
-    Cylinder {
-        along: DVec3,
-        rho_mm: f64,
-        length_mm: f64,
-        turned: f64,
-    },
+    Cylinder { along: DVec3, rho_mm: f64, length_mm: f64, turned: f64 },
     /// Unrolled by the polar angle from its near side.
     Sphere { rho_mm: f64 },
 }
@@ -48,21 +39,13 @@ pub struct Scene(pub Vec<Surface>);
 impl Form {
     /// A plane that faces the camera.
     pub fn facing(side_mm: f64) -> Self {
-        Self::Plane {
-            along: DVec3::X,
-            down: DVec3::NEG_Y,
-            size_mm: DVec2::splat(side_mm),
-        }
+        Self::Plane { along: DVec3::X, down: DVec3::NEG_Y, size_mm: DVec2::splat(side_mm) }
     }
 
     /// A plane turned by `tilt` about the image axis at `axis`, both in degrees.
     pub fn tilted(tilt: f64, axis: f64, side_mm: f64) -> Self {
         let along = direction(axis);
-        Self::Plane {
-            along,
-            down: along.cross(tilted_normal(tilt, axis)),
-            size_mm: DVec2::splat(side_mm),
-        }
+        Self::Plane { along, down: along.cross(tilted_normal(tilt, axis)), size_mm: DVec2::splat(side_mm) }
     }
 
     /// Where a ray meets it first, from its middle.
@@ -93,21 +76,12 @@ impl Form {
     fn at(&self, uv: DVec2) -> Option<(DVec3, f64)> {
         let centred = uv - 0.5;
         match *self {
-            Self::Plane {
-                along,
-                down,
-                size_mm,
-            } => {
+            Self::Plane { along, down, size_mm } => {
                 let place = centred * size_mm;
                 let point = along * place.x + down * place.y;
                 Some((point, size_mm.element_product()))
             }
-            Self::Cylinder {
-                along,
-                rho_mm,
-                length_mm,
-                turned,
-            } => {
+            Self::Cylinder { along, rho_mm, length_mm, turned } => {
                 let (sin, cos) = (TAU * centred.x + turned).sin_cos();
                 let normal = along.cross(DVec3::Z) * sin + DVec3::Z * cos;
                 let point = rho_mm * normal + along * (length_mm * centred.y);
@@ -128,17 +102,8 @@ impl Form {
     /// The way back.
     fn uv(&self, point: DVec3) -> DVec2 {
         let centred = match *self {
-            Self::Plane {
-                along,
-                down,
-                size_mm,
-            } => DVec2::new(point.dot(along), point.dot(down)) / size_mm,
-            Self::Cylinder {
-                along,
-                length_mm,
-                turned,
-                ..
-            } => {
+            Self::Plane { along, down, size_mm } => DVec2::new(point.dot(along), point.dot(down)) / size_mm,
+            Self::Cylinder { along, length_mm, turned, .. } => {
                 let angle = point.dot(along.cross(DVec3::Z)).atan2(point.z) - turned;
                 let around = (angle / TAU + 0.5).rem_euclid(1.0) - 0.5;
                 DVec2::new(around, point.dot(along) / length_mm)
@@ -162,12 +127,7 @@ fn enters(origin: DVec3, ray: DVec3, rho_mm: f64) -> Option<f64> {
 impl Surface {
     /// At a distance of 300 mm.
     pub fn new(form: Form, light: impl Fn(DVec3, DVec3) -> Option<DVec3> + 'static) -> Self {
-        Self {
-            form,
-            middle_mm: DVec3::new(0.0, 0.0, -300.0),
-            light: Box::new(light),
-            scattered: None,
-        }
+        Self { form, middle_mm: DVec3::new(0.0, 0.0, -300.0), light: Box::new(light), scattered: None }
     }
 
     /// Whose scattered light is known.
@@ -223,12 +183,7 @@ impl Surface {
     fn hit(&self, origin: DVec3, ray: DVec3) -> Option<Hit> {
         let point = self.form.meet(origin - self.middle_mm, ray)?;
         let normal = self.form.normal(point);
-        Some(Hit {
-            irradiance: (self.light)(point, normal)?,
-            point: point + self.middle_mm,
-            normal,
-            id: 1,
-        })
+        Some(Hit { irradiance: (self.light)(point, normal)?, point: point + self.middle_mm, normal, id: 1 })
     }
 }
 
@@ -265,10 +220,7 @@ impl Scene {
     pub fn scattered(&self, surface: usize, point: DVec3) -> DVec3 {
         let surface = &self.0[surface];
         let point = point - surface.middle_mm;
-        let scattered = surface
-            .scattered
-            .as_ref()
-            .expect("a surface that is solved");
+        let scattered = surface.scattered.as_ref().expect("a surface that is solved");
         scattered(point, surface.form.normal(point))
     }
 

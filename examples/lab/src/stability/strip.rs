@@ -20,12 +20,7 @@ const LABEL: u32 = 30;
 /// # Errors
 /// A drawing that cannot be made.
 pub fn strip(judged: &Judged, rasteriser: &Rasteriser) -> Result<Option<RgbImage>, Error> {
-    let Some(Shown {
-        size,
-        truth,
-        results,
-    }) = &judged.outcome.shown
-    else {
+    let Some(Shown { size, truth, results }) = &judged.outcome.shown else {
         return Ok(None);
     };
     let zoom = (PANEL / size[0].max(size[1])).max(1);
@@ -49,15 +44,12 @@ pub fn strip(judged: &Judged, rasteriser: &Rasteriser) -> Result<Option<RgbImage
         });
         label(i + 1, &method.replace('_', " "), &verdict);
     }
-    let picture_size = [
-        GAP + (results.len() as u32 + 1) * step,
-        LABEL + 2 * (GAP + height),
-    ];
+    let picture_size = [GAP + (results.len() as u32 + 1) * step, LABEL + 2 * (GAP + height)];
     let [columns, rows] = picture_size.map(f64::from);
     let title = judged.case.title();
     let drawing = rasteriser.picture(&drawing.finish(columns, rows, &title));
-    let drawing = drawing
-        .map_err(|e| Error::new(title, format!("\"{e}\""), "a picture that can be drawn"))?;
+    let drawing =
+        drawing.map_err(|e| Error::new(title, format!("\"{e}\""), "a picture that can be drawn"))?;
     let [columns, rows] = picture_size;
     let mut picture = imageops::thumbnail(&drawing, columns, rows);
     let mut put = |column: usize, row: u32, light: &dyn Fn(usize) -> Vec3| {
@@ -81,11 +73,7 @@ fn srgb(light: Vec3) -> [u8; 3] {
         return [255, 0, 255];
     }
     light.to_array().map(|c| {
-        let encoded = if c <= 0.0031308 {
-            12.92 * c
-        } else {
-            1.055 * c.powf(1.0 / 2.4) - 0.055
-        };
+        let encoded = if c <= 0.0031308 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
         (255.0 * encoded).round() as u8
     })
 }

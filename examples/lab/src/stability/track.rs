@@ -72,8 +72,7 @@ impl Track {
     /// The most that a result at a point falls by from one frame to the next; 0 where it never does.
     pub fn fall(&self) -> Figures {
         self.figures(|frames| {
-            let result =
-                |frame: usize, point: usize| self.truth[frame][point] + frames[frame][point];
+            let result = |frame: usize, point: usize| self.truth[frame][point] + frames[frame][point];
             let falls = self.neighbours().flat_map(|i| {
                 let points = 0..frames[i].len();
                 points.flat_map(move |p| (result(i, p) - result(i + 1, p)).to_array())
@@ -83,15 +82,8 @@ impl Track {
     }
 
     /// A figure of it, and a picture of `points`.
-    pub fn outcome(
-        &self,
-        figures: fn(&Self) -> Figures,
-        points: std::ops::Range<usize>,
-    ) -> Outcome {
-        Outcome {
-            figures: figures(self),
-            shown: Some(self.show(points)),
-        }
+    pub fn outcome(&self, figures: fn(&Self) -> Figures, points: std::ops::Range<usize>) -> Outcome {
+        Outcome { figures: figures(self), shown: Some(self.show(points)) }
     }
 
     /// A picture of `points`, side by side, a frame a row from the first on.
@@ -112,16 +104,12 @@ impl Track {
 
     /// The first of each two frames that follow each other.
     fn neighbours(&self) -> impl Iterator<Item = usize> + '_ {
-        (1..self.frames.len())
-            .filter(|i| self.frames[*i] == self.frames[i - 1] + 1)
-            .map(|i| i - 1)
+        (1..self.frames.len()).filter(|i| self.frames[*i] == self.frames[i - 1] + 1).map(|i| i - 1)
     }
 
     fn figures(&self, of: impl Fn(&[Vec<DVec3>]) -> f64) -> Figures {
         let methods = self.errors.iter();
-        methods
-            .map(|(method, frames)| (*method, of(frames)))
-            .collect()
+        methods.map(|(method, frames)| (*method, of(frames))).collect()
     }
 }
 
@@ -149,11 +137,7 @@ pub fn taps(g: &GBuffer, points: impl IntoIterator<Item = DVec3>) -> Vec<Tap> {
             for (i, column) in x.into_iter().enumerate() {
                 let pixel = (first.y + j) * width + first.x + i;
                 let hit = g.hits[pixel].expect("what is followed stays in the picture");
-                taps.push(Tap {
-                    pixel,
-                    point: hit.point,
-                    weight: row * column,
-                });
+                taps.push(Tap { pixel, point: hit.point, weight: row * column });
             }
         }
     }
@@ -164,18 +148,11 @@ pub fn taps(g: &GBuffer, points: impl IntoIterator<Item = DVec3>) -> Vec<Tap> {
 pub fn read(taps: &[Tap], values: impl IntoIterator<Item = DVec3>) -> Vec<DVec3> {
     let weighed = values.into_iter().zip(taps).map(|(v, tap)| v * tap.weight);
     let weighed: Vec<DVec3> = weighed.collect();
-    weighed
-        .chunks(TAPS)
-        .map(|of_point| of_point.iter().sum())
-        .collect()
+    weighed.chunks(TAPS).map(|of_point| of_point.iter().sum()).collect()
 }
 
 /// Errors at the points that were read, from results and truths at their taps.
-pub fn errors(
-    taps: &[Tap],
-    truths: &[DVec3],
-    results: impl IntoIterator<Item = Vec3>,
-) -> Vec<DVec3> {
+pub fn errors(taps: &[Tap], truths: &[DVec3], results: impl IntoIterator<Item = Vec3>) -> Vec<DVec3> {
     let pairs = results.into_iter().zip(truths);
     read(taps, pairs.map(|(r, truth)| r.as_dvec3() - truth))
 }
@@ -242,11 +219,7 @@ impl Followed {
                 let fetched = fetched[number as usize * count..][..count].iter().copied();
                 of_methods.push((*method, errors(&taps, &truths, fetched)));
             }
-            let truth = self
-                .points
-                .iter()
-                .map(|p| self.scene.scattered(0, *p))
-                .collect();
+            let truth = self.points.iter().map(|p| self.scene.scattered(0, *p)).collect();
             track.push(number, truth, of_methods);
         }
         // Few enough points for a small picture.

@@ -53,15 +53,7 @@ pub struct Look {
 impl Trial {
     /// All pixels of `crop`, before nothing, in screen space alone.
     pub fn new(scene: Scene, view: View, crop: Crop, truth: Truth) -> Self {
-        Self {
-            scene,
-            view,
-            background: 0.0,
-            crop,
-            asked: Box::new(|_| true),
-            truth,
-            atlas: None,
-        }
+        Self { scene, view, background: 0.0, crop, asked: Box::new(|_| true), truth, atlas: None }
     }
 
     pub fn before(self, background: f64) -> Self {
@@ -69,17 +61,11 @@ impl Trial {
     }
 
     pub fn only_where(self, asked: impl Fn(&Hit) -> bool + 'static) -> Self {
-        Self {
-            asked: Box::new(asked),
-            ..self
-        }
+        Self { asked: Box::new(asked), ..self }
     }
 
     pub fn atlas(self, texels: [u32; 2], truth: Truth) -> Self {
-        Self {
-            atlas: Some((texels, truth)),
-            ..self
-        }
+        Self { atlas: Some((texels, truth)), ..self }
     }
 
     /// The largest difference of each method.
@@ -138,10 +124,7 @@ impl Trial {
 impl Look {
     /// In screen space alone.
     pub fn outcome(&self, measure: Measure) -> Outcome {
-        Outcome {
-            figures: measure(&self.results, &self.truth),
-            shown: Some(self.show(&self.results)),
-        }
+        Outcome { figures: measure(&self.results, &self.truth), shown: Some(self.show(&self.results)) }
     }
 
     /// With the methods in texture space over an atlas; places that it does not have are not asked for. The
@@ -158,8 +141,7 @@ impl Look {
         measure: Measure,
     ) -> Result<Outcome, Error> {
         let places = self.pixels.iter().zip(truth);
-        let places =
-            places.filter_map(|((_, surface, hit), t)| Some((*t, uv(*surface, hit.point)?)));
+        let places = places.filter_map(|((_, surface, hit), t)| Some((*t, uv(*surface, hit.point)?)));
         let (truth, uvs): (Known, Vec<DVec2>) = places.unzip();
         let place = |values: Vec<Vec3>| {
             let mut all = self.results[0].1.clone();
@@ -199,10 +181,7 @@ impl Look {
                 atlas.map_or(vec![], |atlas| atlas.truth(&points.collect::<Vec<_>>()))
             }
             Truth::Closed => {
-                let places = self
-                    .pixels
-                    .iter()
-                    .map(|(_, i, h)| scene.scattered(*i, h.point));
+                let places = self.pixels.iter().map(|(_, i, h)| scene.scattered(*i, h.point));
                 places.collect()
             }
         };
@@ -242,9 +221,7 @@ impl Crop {
         let known: Vec<Option<Vec3>> = pixels.iter().map(known).collect();
         let cut = |values: &[Vec3]| {
             let pairs = pixels.iter().zip(&known);
-            pairs
-                .map(|(i, t)| t.map_or(Vec3::ZERO, |_| values[*i]))
-                .collect()
+            pairs.map(|(i, t)| t.map_or(Vec3::ZERO, |_| values[*i])).collect()
         };
         Shown {
             size: self.size,
@@ -271,9 +248,7 @@ pub fn worst(results: &Results, truth: &Known) -> Figures {
 pub fn relative_rms(results: &Results, truth: &Known) -> Figures {
     let whole: f64 = truth.iter().map(|(_, t)| t.length_squared()).sum();
     let of = |values: &[Vec3]| {
-        let differences = truth
-            .iter()
-            .map(|(i, t)| t.distance_squared(values[*i].as_dvec3()));
+        let differences = truth.iter().map(|(i, t)| t.distance_squared(values[*i].as_dvec3()));
         (differences.sum::<f64>() / whole).sqrt()
     };
     results.iter().map(|(name, r)| (*name, of(r))).collect()
@@ -303,9 +278,7 @@ pub fn merge(into: &mut Figures, figures: impl IntoIterator<Item = (&'static str
 ///
 /// # Errors
 /// The first that failed.
-pub fn worst_of(
-    outcomes: impl IntoIterator<Item = Result<Outcome, Error>>,
-) -> Result<Outcome, Error> {
+pub fn worst_of(outcomes: impl IntoIterator<Item = Result<Outcome, Error>>) -> Result<Outcome, Error> {
     let mut worst = Outcome::default();
     for outcome in outcomes {
         let outcome = outcome?;

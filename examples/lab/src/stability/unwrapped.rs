@@ -54,12 +54,7 @@ impl Unwrapped {
                 skin.extend(found.map(|t| pixel(t.point_mm, t.irradiance, t.area_mm2)));
             }
         }
-        Self {
-            size,
-            irradiance,
-            positions,
-            skin,
-        }
+        Self { size, irradiance, positions, skin }
     }
 
     /// The integral over all of the surface, hidden parts included, at these points of it; each with
@@ -81,13 +76,9 @@ impl Unwrapped {
     /// An atlas that a method refuses.
     pub fn scatter(&self, lab: &Lab, uvs: &[DVec2]) -> Result<Results, Error> {
         let uploaded = self.upload(&lab.gpu);
-        let results = lab
-            .scatter_atlas(&uploaded.atlas(), &uploaded.output)?
-            .into_iter();
+        let results = lab.scatter_atlas(&uploaded.atlas(), &uploaded.output)?.into_iter();
         let fetched = |texels: Vec<Vec3>| uvs.iter().map(|uv| self.fetch(&texels, *uv)).collect();
-        Ok(results
-            .map(|(name, texels)| (name, fetched(texels)))
-            .collect())
+        Ok(results.map(|(name, texels)| (name, fetched(texels))).collect())
     }
 
     /// With an output of its own.
@@ -121,11 +112,7 @@ impl Unwrapped {
 impl Uploaded {
     /// In mm, of skin.
     pub fn atlas(&self) -> Atlas<'_> {
-        Atlas {
-            irradiance: &self.irradiance,
-            positions: &self.positions,
-            mm_per_unit: 1.0,
-        }
+        Atlas { irradiance: &self.irradiance, positions: &self.positions, mm_per_unit: 1.0 }
     }
 }
 

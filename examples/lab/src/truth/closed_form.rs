@@ -20,8 +20,7 @@ pub fn scattered_step(x_mm: f64, blur_mm2: f64, profile: &Profile) -> DVec3 {
         .gaussians()
         .iter()
         .map(|g| {
-            glam::DVec3::from(g.weight.map(f64::from))
-                * step(x_mm, f64::from(g.variance_mm2) + blur_mm2)
+            glam::DVec3::from(g.weight.map(f64::from)) * step(x_mm, f64::from(g.variance_mm2) + blur_mm2)
         })
         .sum()
 }
@@ -30,9 +29,7 @@ pub fn scattered_step(x_mm: f64, blur_mm2: f64, profile: &Profile) -> DVec3 {
 pub fn passed_wave(rad_per_mm: f64, profile: &Profile) -> DVec3 {
     let passed = |v: f32| (-0.5 * f64::from(v) * rad_per_mm * rad_per_mm).exp();
     let gaussians = profile.gaussians().iter();
-    gaussians
-        .map(|g| glam::DVec3::from(g.weight.map(f64::from)) * passed(g.variance_mm2))
-        .sum()
+    gaussians.map(|g| glam::DVec3::from(g.weight.map(f64::from)) * passed(g.variance_mm2)).sum()
 }
 
 /// A spot exp(−r²/2s) on a plane, scattered by a profile, r mm from its middle.
@@ -42,9 +39,7 @@ pub fn scattered_spot(r_mm: f64, spot_mm2: f64, profile: &Profile) -> DVec3 {
         spot_mm2 / sum_mm2 * (-r_mm * r_mm / (2.0 * sum_mm2)).exp()
     };
     let gaussians = profile.gaussians().iter();
-    gaussians
-        .map(|g| glam::DVec3::from(g.weight.map(f64::from)) * spread(g.variance_mm2))
-        .sum()
+    gaussians.map(|g| glam::DVec3::from(g.weight.map(f64::from)) * spread(g.variance_mm2)).sum()
 }
 
 /// The Legendre polynomials P₀(x), P₁(x) and so on.
@@ -151,8 +146,7 @@ pub fn through_slab(thickness_mm: f64, profile: &Profile) -> DVec3 {
     gaussians
         .map(|g| {
             let v = f64::from(g.variance_mm2);
-            glam::DVec3::from(g.weight.map(f64::from))
-                * (-thickness_mm * thickness_mm / (2.0 * v)).exp()
+            glam::DVec3::from(g.weight.map(f64::from)) * (-thickness_mm * thickness_mm / (2.0 * v)).exp()
         })
         .sum()
 }

@@ -40,10 +40,7 @@ pub(super) struct Kernel {
 impl Kernel {
     /// As wide in all directions.
     pub fn round(variance_mm2: f32) -> Self {
-        Self {
-            variance_mm2,
-            narrowed: Vec3::ZERO,
-        }
+        Self { variance_mm2, narrowed: Vec3::ZERO }
     }
 }
 
@@ -138,9 +135,8 @@ fn exp(x: f32) -> f32 {
     // ln 2 in two parts, so that n·ln 2 keeps its digits.
     let f = (x - n * 0.693_359_4) + n * 2.121_944_4e-4;
     let series = 1.0 / 720.0;
-    let series = [1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0]
-        .iter()
-        .fold(series, |sum, term| sum * f + term);
+    let series =
+        [1.0 / 120.0, 1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0].iter().fold(series, |sum, term| sum * f + term);
     if x <= -87.0 { 0.0 } else { power * series }
 }
 

@@ -42,9 +42,7 @@ pub fn random_walk(
         progress(1.0 / PARTS as f64);
         rings.map(|light| light / each as f64)
     });
-    Walk {
-        parts: parts.collect(),
-    }
+    Walk { parts: parts.collect() }
 }
 
 impl Walk {
@@ -163,16 +161,8 @@ fn path(medium: &Medium, incidence: Incidence, random: &mut Random, rings: &mut 
                 }
             } else {
                 // On the face itself, or rounding would leave it on the wrong side.
-                at[2] = if next > layer {
-                    top + here.thickness_mm
-                } else {
-                    top
-                };
-                top = if next > layer {
-                    at[2]
-                } else {
-                    top - layers[next].thickness_mm
-                };
+                at[2] = if next > layer { top + here.thickness_mm } else { top };
+                top = if next > layer { at[2] } else { top - layers[next].thickness_mm };
                 layer = next;
             }
         }

@@ -64,10 +64,7 @@ pub fn surface_integral<E>(
     progress: Progress,
 ) -> Result<SurfaceIntegral, E> {
     let points: Vec<Vec3> = asked.iter().map(|p| p.point_mm).collect();
-    let points = Points {
-        tree: Tree::new(&points),
-        points,
-    };
+    let points = Points { tree: Tree::new(&points), points };
     let mut result = SurfaceIntegral {
         printed: vec![Vec3::ZERO; asked.len()],
         normalised: vec![Vec3::ZERO; asked.len()],
@@ -219,13 +216,7 @@ struct Corner {
 impl Cutter<'_> {
     /// Halves a triangle across its longest edge until it is small enough, and drops what is out of
     /// reach; `is_near` spares the search where all of it is known to be within.
-    fn cut(
-        &self,
-        triangle: usize,
-        corners: [Corner; 3],
-        mut is_near: bool,
-        pieces: &mut Vec<Piece>,
-    ) {
+    fn cut(&self, triangle: usize, corners: [Corner; 3], mut is_near: bool, pieces: &mut Vec<Piece>) {
         let [a, b, c] = corners.map(|c| c.point_mm);
         let center = (a + b + c) / 3.0;
         let radius = [a, b, c].map(|p| p.distance(center));
@@ -234,23 +225,14 @@ impl Cutter<'_> {
             if !self.points.any_within(center, self.reach_mm + radius) {
                 return;
             }
-            is_near =
-                radius < self.reach_mm && self.points.any_within(center, self.reach_mm - radius);
+            is_near = radius < self.reach_mm && self.points.any_within(center, self.reach_mm - radius);
         }
         let edges = [a.distance(b), b.distance(c), c.distance(a)];
-        let longest = (0..3)
-            .max_by(|&i, &j| edges[i].total_cmp(&edges[j]))
-            .unwrap_or(0);
+        let longest = (0..3).max_by(|&i, &j| edges[i].total_cmp(&edges[j])).unwrap_or(0);
         // What is not finite would never become small.
         if edges[longest] <= self.longest_mm || !edges[longest].is_finite() {
             let barycentric = corners.iter().map(|c| c.barycentric).sum::<Vec3>() / 3.0;
-            pieces.push(Piece {
-                place: Place {
-                    triangle,
-                    barycentric,
-                },
-                corners_mm: [a, b, c],
-            });
+            pieces.push(Piece { place: Place { triangle, barycentric }, corners_mm: [a, b, c] });
             return;
         }
         let [start, end] = [longest, (longest + 1) % 3];

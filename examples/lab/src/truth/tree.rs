@@ -26,22 +26,13 @@ struct Node {
 impl Tree {
     pub fn new(points: &[Vec3]) -> Self {
         let mut order: Vec<u32> = (0..points.len() as u32).collect();
-        let nodes = if points.is_empty() {
-            Vec::new()
-        } else {
-            build(points, &mut order, 0)
-        };
+        let nodes = if points.is_empty() { Vec::new() } else { build(points, &mut order, 0) };
         Self { order, nodes }
     }
 
     /// Calls `visit` with the places of each leaf that comes within `radius` of `center`, until it
     /// returns true; tells whether it did.
-    pub fn any_leaf(
-        &self,
-        center: Vec3,
-        radius: f32,
-        mut visit: impl FnMut(Range<usize>) -> bool,
-    ) -> bool {
+    pub fn any_leaf(&self, center: Vec3, radius: f32, mut visit: impl FnMut(Range<usize>) -> bool) -> bool {
         let mut i = 0;
         while let Some(node) = self.nodes.get(i) {
             let nearest = center.clamp(node.min, node.max);
@@ -67,28 +58,19 @@ fn build(points: &[Vec3], order: &mut [u32], first: u32) -> Vec<Node> {
         min = min.min(points[i as usize]);
         max = max.max(points[i as usize]);
     }
-    let node = Node {
-        min,
-        max,
-        places: first..first + order.len() as u32,
-        next: 1,
-    };
+    let node = Node { min, max, places: first..first + order.len() as u32, next: 1 };
     if order.len() <= LEAF {
         return vec![node];
     }
     let axis = (max - min).max_position();
     // Halves of whole leaves, so that few leaves are part full.
-    let middle = (order.len() / 2)
-        .next_multiple_of(LEAF)
-        .min(order.len() - 1);
+    let middle = (order.len() / 2).next_multiple_of(LEAF).min(order.len() - 1);
     order.select_nth_unstable_by(middle, |&a, &b| {
         points[a as usize][axis].total_cmp(&points[b as usize][axis])
     });
     let (left, right) = order.split_at_mut(middle);
-    let (left, right) = rayon::join(
-        || build(points, left, first),
-        || build(points, right, first + middle as u32),
-    );
+    let (left, right) =
+        rayon::join(|| build(points, left, first), || build(points, right, first + middle as u32));
     let mut nodes = Vec::with_capacity(1 + left.len() + right.len());
     nodes.push(node);
     for child in [left, right] {
@@ -116,12 +98,9 @@ mod tests {
             })
             .collect();
         let tree = Tree::new(&points);
-        for (center, radius) in [
-            (Vec3::ZERO, 0.3),
-            (Vec3::ONE, 0.5),
-            (Vec3::splat(9.0), 1.0),
-            (Vec3::ZERO, 9.0),
-        ] {
+        for (center, radius) in
+            [(Vec3::ZERO, 0.3), (Vec3::ONE, 0.5), (Vec3::splat(9.0), 1.0), (Vec3::ZERO, 9.0)]
+        {
             let inside = |i: &usize| points[*i].distance(center) <= radius;
             let mut found = Vec::new();
             tree.any_leaf(center, radius, |places| {

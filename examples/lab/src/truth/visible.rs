@@ -98,17 +98,12 @@ impl Lattice {
         }
         let along = a.normalize_or_zero();
         let across = b - along * b.dot(along);
-        Self {
-            axes: [along, across.normalize_or_zero()],
-            spacing_mm: [a.length(), across.length()],
-        }
+        Self { axes: [along, across.normalize_or_zero()], spacing_mm: [a.length(), across.length()] }
     }
 
     /// The weights of a Gaussian.
     fn kernel(&self, variance_mm2: f32) -> Kernel {
-        let variances = self
-            .spacing_mm
-            .map(|mm| lattice_variance(variance_mm2.into(), mm * mm));
+        let variances = self.spacing_mm.map(|mm| lattice_variance(variance_mm2.into(), mm * mm));
         let narrow = usize::from(variances[1] < variances[0]);
         let [narrowest, widest] = [variances[narrow], variances[1 - narrow]];
         Kernel {
@@ -188,20 +183,14 @@ mod tests {
                         area_mm2: steps[0].cross(steps[1]).length() as f32,
                         irradiance: Vec3::splat(step(point.dot(across), blur_mm2) as f32),
                     },
-                    steps_mm: if is_own {
-                        steps.map(|s| s.as_vec3())
-                    } else {
-                        facing
-                    },
+                    steps_mm: if is_own { steps.map(|s| s.as_vec3()) } else { facing },
                 });
             }
         }
         let found = visible_integral(&pixels, &asked, &Profile::SKIN, &|_| ());
         let error = |(i, found): (&usize, &Vec3)| {
             let x = pixels[*i].patch.point_mm.as_dvec3().dot(across);
-            (found.as_dvec3() - scattered_step(x, blur_mm2, &Profile::SKIN))
-                .abs()
-                .max_element()
+            (found.as_dvec3() - scattered_step(x, blur_mm2, &Profile::SKIN)).abs().max_element()
         };
         asked.iter().zip(&found).map(error).fold(0.0, f64::max)
     }
@@ -211,10 +200,7 @@ mod tests {
         let tangents = [Vec3::X, Vec3::new(0.0, 1.0, 3.0)];
         let plane = |x: i32, y: i32| x as f32 * tangents[0] + y as f32 * tangents[1];
         let facing = [Vec3::X * 0.5, Vec3::Y * 0.5];
-        assert_eq!(
-            even_steps(tangents, 0.5, |x, y| Some(plane(x, y))),
-            tangents
-        );
+        assert_eq!(even_steps(tangents, 0.5, |x, y| Some(plane(x, y))), tangents);
         let bends = |x, y| Some(plane(x, y) + Vec3::Z * (x * x) as f32);
         assert_eq!(even_steps(tangents, 0.5, bends), facing);
         let ends = |x, y| (y < 1).then(|| plane(x, y));
@@ -223,13 +209,7 @@ mod tests {
 
     #[test]
     fn slopes_are_summed_on_their_own_lattice() {
-        let slopes = [
-            (3.0, 0.0),
-            (3.0, 40.0),
-            (3.0, 60.0),
-            (5.0, 60.0),
-            (3.0, 70.0),
-        ];
+        let slopes = [(3.0, 0.0), (3.0, 40.0), (3.0, 60.0), (5.0, 60.0), (3.0, 70.0)];
         let mut worst_facing: f64 = 0.0;
         for (px_per_mm, tilt) in slopes {
             for axis in [0.0, 25.0, 45.0] {

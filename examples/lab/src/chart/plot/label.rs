@@ -24,30 +24,17 @@ impl Area {
 
     /// Between two corners.
     pub fn between(a: Point, b: Point) -> Self {
-        Self {
-            left: a[0].min(b[0]),
-            top: a[1].min(b[1]),
-            right: a[0].max(b[0]),
-            bottom: a[1].max(b[1]),
-        }
+        Self { left: a[0].min(b[0]), top: a[1].min(b[1]), right: a[0].max(b[0]), bottom: a[1].max(b[1]) }
     }
 
     /// So much larger on every side.
     pub fn grown(self, by: f64) -> Self {
-        Self {
-            left: self.left - by,
-            top: self.top - by,
-            right: self.right + by,
-            bottom: self.bottom + by,
-        }
+        Self { left: self.left - by, top: self.top - by, right: self.right + by, bottom: self.bottom + by }
     }
 
     /// The centre.
     pub fn centre(&self) -> Point {
-        [
-            (self.left + self.right) / 2.0,
-            (self.top + self.bottom) / 2.0,
-        ]
+        [(self.left + self.right) / 2.0, (self.top + self.bottom) / 2.0]
     }
 
     fn size(&self) -> f64 {
@@ -99,10 +86,7 @@ fn candidates([x, y]: Point, width: f64, height: f64) -> impl Iterator<Item = Ar
     ];
     [6.5, 13.0, 21.0, 32.0].into_iter().flat_map(move |gap| {
         SIDES.into_iter().map(move |[right, down]| {
-            let centre = [
-                x + right * (gap + width / 2.0),
-                y + down * (gap + height / 2.0),
-            ];
+            let centre = [x + right * (gap + width / 2.0), y + down * (gap + height / 2.0)];
             Area::around(centre, width, height)
         })
     })
@@ -129,9 +113,8 @@ pub fn spread(wanted: &[f64], gap: f64, low: f64, high: f64) -> Vec<f64> {
         pools.push(pool);
     }
     let last = high - count.saturating_sub(1) as f64 * gap;
-    let places = pools
-        .into_iter()
-        .flat_map(|(sum, n)| std::iter::repeat_n((sum / n as f64).clamp(low, last), n));
+    let places =
+        pools.into_iter().flat_map(|(sum, n)| std::iter::repeat_n((sum / n as f64).clamp(low, last), n));
     let mut spread = vec![0.0; count];
     for (rank, (i, place)) in order.into_iter().zip(places).enumerate() {
         spread[i] = place + rank as f64 * gap;
@@ -159,11 +142,7 @@ mod tests {
     fn labels_of_one_place_do_not_lie_on_one_another() {
         let bounds = Area::around([50.0, 50.0], 100.0, 100.0);
         let point = [95.0, 50.0];
-        let places = beside(
-            &[(point, 20.0, 10.0); 5],
-            &[Area::around(point, 10.0, 10.0)],
-            bounds,
-        );
+        let places = beside(&[(point, 20.0, 10.0); 5], &[Area::around(point, 10.0, 10.0)], bounds);
         for (i, place) in places.iter().enumerate() {
             assert!(place.right <= 100.0, "{place:?}");
             for other in &places[..i] {

@@ -89,18 +89,9 @@ pub fn error_time(rows: &[Row], measure: &Measure, caption: &str) -> Option<Stri
         let (column, line) = (i % columns, i / columns);
         let left = LEFT + column as f64 * (width + gap);
         let panel_top = top + line as f64 * (height + 56.0) + 22.0;
-        let area = Area {
-            left,
-            top: panel_top,
-            right: left + width,
-            bottom: panel_top + height,
-        };
+        let area = Area { left, top: panel_top, right: left + width, bottom: panel_top + height };
         let panel = Panel::new(area, x, y);
-        let of_scene: Vec<&Row> = rows
-            .iter()
-            .copied()
-            .filter(|row| row.scene == *scene)
-            .collect();
+        let of_scene: Vec<&Row> = rows.iter().copied().filter(|row| row.scene == *scene).collect();
         panel.grid(&mut svg, &x.ticks(), column == 0);
         panel.title(&mut svg, scene, &of_scene);
         if column == 0 {
@@ -137,27 +128,19 @@ pub fn width(rows: &[Row], caption: &str) -> Option<String> {
     let x = Scale::over(edges.iter().map(|row| sigma_mm * row.px_per_mm));
     let styles = styles(edges.iter().map(|row| row.method.as_str()));
     let against_width = |value: fn(&Row) -> Option<f64>| {
-        curves(&edges, &styles, |row| {
-            Some((sigma_mm * row.px_per_mm, value(row)?))
-        })
+        curves(&edges, &styles, |row| Some((sigma_mm * row.px_per_mm, value(row)?)))
     };
     let errors = against_width(|row| row.max_error_visible);
     let times = against_width(|row| Some(row.x_copy));
     let names = names_width(&errors).max(names_width(&times));
     let limit = [(1.0 / 255.0, "1/255")];
-    for (name, curves, levels) in [
-        ("largest error, linear", errors, limit.as_slice()),
-        ("time, in plain copies", times, &[]),
-    ] {
+    for (name, curves, levels) in
+        [("largest error, linear", errors, limit.as_slice()), ("time, in plain copies", times, &[])]
+    {
         let values = curves.iter().flat_map(|curve| &curve.points);
         let values = values.map(|point| point.1);
         let y = Scale::over(values.chain(levels.iter().map(|level| level.0)));
-        let area = Area {
-            left: LEFT,
-            top: top + 10.0,
-            right: WIDTH - names,
-            bottom: top + 370.0,
-        };
+        let area = Area { left: LEFT, top: top + 10.0, right: WIDTH - names, bottom: top + 370.0 };
         let panel = Panel::new(area, x, y);
         panel.grid(&mut svg, &x.ticks(), true);
         panel.name_y(&mut svg, name);
@@ -187,11 +170,7 @@ pub fn heads(series: &[Series], caption: &str) -> Option<String> {
                 name: style.name(setting),
                 style,
                 dashes: "",
-                measured: points
-                    .clone()
-                    .take(measured)
-                    .filter(|&p| is_drawn(p))
-                    .count(),
+                measured: points.clone().take(measured).filter(|&p| is_drawn(p)).count(),
                 points: points.filter(|&p| is_drawn(p)).collect(),
             })
         })
@@ -202,17 +181,10 @@ pub fn heads(series: &[Series], caption: &str) -> Option<String> {
     }
     let title = "Many heads";
     let mut svg = Svg::default();
-    let top = heading(
-        &mut svg,
-        title,
-        "Frames a second against heads in view, as in Li & Shao 2015, Fig. 8.",
-    );
-    let area = Area {
-        left: LEFT,
-        top: top + 10.0,
-        right: WIDTH - names_width(&curves),
-        bottom: top + 420.0,
-    };
+    let top =
+        heading(&mut svg, title, "Frames a second against heads in view, as in Li & Shao 2015, Fig. 8.");
+    let area =
+        Area { left: LEFT, top: top + 10.0, right: WIDTH - names_width(&curves), bottom: top + 420.0 };
     let points = || curves.iter().flat_map(|curve| &curve.points);
     let x = Scale::over(points().map(|point| point.0));
     let y = Scale::over(points().map(|point| point.1));
@@ -221,13 +193,8 @@ pub fn heads(series: &[Series], caption: &str) -> Option<String> {
     let mut counts: Vec<f64> = points().map(|point| point.0).collect();
     counts.sort_by(f64::total_cmp);
     counts.dedup();
-    let ticks: Vec<Tick> = counts
-        .into_iter()
-        .map(|value| Tick {
-            value,
-            label: Some(value.to_string()),
-        })
-        .collect();
+    let ticks: Vec<Tick> =
+        counts.into_iter().map(|value| Tick { value, label: Some(value.to_string()) }).collect();
     panel.grid(&mut svg, &ticks, true);
     panel.name_x(&mut svg, "number of heads");
     panel.name_y(&mut svg, "frames a second");
@@ -320,13 +287,8 @@ fn legend(svg: &mut Svg, styles: &[Style], top: f64) -> f64 {
 fn finish(mut svg: Svg, top: f64, title: &str, caption: &str) -> String {
     let mut y = top + 14.0;
     for paragraph in caption.lines() {
-        let code = paragraph
-            .strip_prefix('`')
-            .and_then(|rest| rest.strip_suffix('`'));
-        let set = Type {
-            code: code.is_some(),
-            ..SMALL
-        };
+        let code = paragraph.strip_prefix('`').and_then(|rest| rest.strip_suffix('`'));
+        let set = Type { code: code.is_some(), ..SMALL };
         let mut line = String::new();
         for word in code.unwrap_or(paragraph).split_whitespace() {
             let longer = format!("{line} {word}");

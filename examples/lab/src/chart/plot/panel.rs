@@ -53,11 +53,7 @@ pub struct Panel {
 
 impl Panel {
     pub fn new(area: Area, x: Scale, y: Scale) -> Self {
-        Self {
-            area,
-            x: x.between(area.left, area.right),
-            y: y.between(area.bottom, area.top),
-        }
+        Self { area, x: x.between(area.left, area.right), y: y.between(area.bottom, area.top) }
     }
 
     fn place(&self, (x, y): (f64, f64)) -> Point {
@@ -65,37 +61,20 @@ impl Panel {
     }
 
     pub fn grid(&self, svg: &mut Svg, x_ticks: &[Tick], is_y_labelled: bool) {
-        let Area {
-            left,
-            top,
-            right,
-            bottom,
-        } = self.area;
+        let Area { left, top, right, bottom } = self.area;
         let y_ticks = self.y.ticks();
         // Minor lines lie below major ones.
         for (stroke, is_major) in [(MINOR, false), (GRID, true)] {
-            for tick in x_ticks
-                .iter()
-                .filter(|tick| tick.label.is_some() == is_major)
-            {
+            for tick in x_ticks.iter().filter(|tick| tick.label.is_some() == is_major) {
                 let x = self.x.place(tick.value);
                 svg.line(&[[x, top], [x, bottom]], stroke);
             }
-            for tick in y_ticks
-                .iter()
-                .filter(|tick| tick.label.is_some() == is_major)
-            {
+            for tick in y_ticks.iter().filter(|tick| tick.label.is_some() == is_major) {
                 let y = self.y.place(tick.value);
                 svg.line(&[[left, y], [right, y]], stroke);
             }
         }
-        let frame = [
-            [left, top],
-            [right, top],
-            [right, bottom],
-            [left, bottom],
-            [left, top],
-        ];
+        let frame = [[left, top], [right, top], [right, bottom], [left, bottom], [left, top]];
         svg.line(&frame, Stroke::new("#bbb", 1.0));
         for tick in x_ticks {
             let at = [self.x.place(tick.value), bottom + 16.0];
@@ -116,15 +95,7 @@ impl Panel {
 
     pub fn name_y(&self, svg: &mut Svg, name: &str) {
         let at = [self.area.left - 50.0, self.area.centre()[1]];
-        svg.text(
-            at,
-            name,
-            Type {
-                anchor: "middle",
-                upwards: true,
-                ..TEXT
-            },
-        );
+        svg.text(at, name, Type { anchor: "middle", upwards: true, ..TEXT });
     }
 
     /// The scene, and how large a millimetre is in it.
@@ -143,11 +114,7 @@ impl Panel {
         let Area { left, right, .. } = self.area;
         let y = self.y.place(value);
         svg.line(&[[left, y], [right, y]], REFERENCE);
-        let x = if anchor == "start" {
-            left + 5.0
-        } else {
-            right - 5.0
-        };
+        let x = if anchor == "start" { left + 5.0 } else { right - 5.0 };
         svg.text([x, y - 4.0], name, SMALL.anchored(anchor));
     }
 
@@ -159,9 +126,7 @@ impl Panel {
         styles: &[Style],
         error: impl Fn(&Row) -> Option<f64>,
     ) {
-        let Area {
-            top, right, bottom, ..
-        } = self.area;
+        let Area { top, right, bottom, .. } = self.area;
         for row in rows.iter().filter(|row| row.method == COPY) {
             let x = self.x.place(row.ms);
             svg.line(&[[x, top], [x, bottom]], REFERENCE.dashed("3 3"));
@@ -188,21 +153,11 @@ impl Panel {
             .collect();
         let labels: Vec<_> = points
             .iter()
-            .map(|(row, _, place)| {
-                (
-                    *place,
-                    text_width(&row.setting, Type::new(INK, LABEL)),
-                    LABEL,
-                )
-            })
+            .map(|(row, _, place)| (*place, text_width(&row.setting, Type::new(INK, LABEL)), LABEL))
             .collect();
         // What labels should not lie on.
-        let markers = points
-            .iter()
-            .map(|(.., place)| Area::around(*place, 11.0, 11.0));
-        let front = steps
-            .windows(2)
-            .map(|step| Area::between(step[0], step[1]).grown(2.0));
+        let markers = points.iter().map(|(.., place)| Area::around(*place, 11.0, 11.0));
+        let front = steps.windows(2).map(|step| Area::between(step[0], step[1]).grown(2.0));
         let level = levels.iter().map(|(_, (_, error))| {
             let y = self.y.place(*error);
             Area::between([right - 80.0, y - 14.0], [right, y])
@@ -211,19 +166,12 @@ impl Panel {
         let areas = beside(&labels, &drawn, self.area);
         for ((row, style, [x, y]), area) in points.iter().zip(areas) {
             // A line to its point, where the label is not right beside it.
-            let near = [
-                x.clamp(area.left, area.right),
-                y.clamp(area.top, area.bottom),
-            ];
+            let near = [x.clamp(area.left, area.right), y.clamp(area.top, area.bottom)];
             if !row.setting.is_empty() && (near[0] - x).hypot(near[1] - y) > 10.0 {
                 svg.line(&[[*x, *y], near], Stroke::new(style.color, 0.6));
             }
             let at = [area.centre()[0], area.centre()[1] + 0.36 * LABEL];
-            svg.text(
-                at,
-                &row.setting,
-                Type::new(style.color, LABEL).anchored("middle"),
-            );
+            svg.text(at, &row.setting, Type::new(style.color, LABEL).anchored("middle"));
         }
         for (_, style, place) in points {
             svg.marker(place, style.marker, style.color, false);
@@ -253,11 +201,7 @@ impl Panel {
         for (curve, name_y) in curves.iter().zip(names) {
             let color = curve.style.color;
             let stroke = Stroke::new(color, 1.6).dashed(curve.dashes);
-            let places: Vec<Point> = curve
-                .points
-                .iter()
-                .map(|&point| self.place(point))
-                .collect();
+            let places: Vec<Point> = curve.points.iter().map(|&point| self.place(point)).collect();
             svg.line(&places[..curve.measured], stroke);
             if curve.measured < places.len() {
                 let from = curve.measured.saturating_sub(1);
@@ -272,11 +216,7 @@ impl Panel {
             }
             if let Some(&[x, y]) = places.last() {
                 let right = self.area.right;
-                let leader = [
-                    [x + 6.0, y],
-                    [right + 8.0, y],
-                    [right + LEADER - 4.0, name_y],
-                ];
+                let leader = [[x + 6.0, y], [right + 8.0, y], [right + LEADER - 4.0, name_y]];
                 svg.line(&leader, Stroke::new(color, 0.7));
                 svg.text([right + LEADER, name_y + 4.0], &curve.name, LEGEND);
             }
@@ -290,14 +230,7 @@ mod tests {
 
     #[test]
     fn no_point_of_the_front_is_beaten() {
-        let points = vec![
-            (3.0, 1.0),
-            (0.0, 9.0),
-            (2.0, 4.0),
-            (2.0, 3.0),
-            (2.5, 3.0),
-            (4.0, 2.0),
-        ];
+        let points = vec![(3.0, 1.0), (0.0, 9.0), (2.0, 4.0), (2.0, 3.0), (2.5, 3.0), (4.0, 2.0)];
         assert_eq!(front(points), [(0.0, 9.0), (2.0, 3.0), (3.0, 1.0)]);
         assert!(front(vec![]).is_empty());
     }

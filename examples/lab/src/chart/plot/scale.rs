@@ -41,13 +41,7 @@ impl Scale {
         }
         let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
         let room = (ROOM * (high - low)).max((1.0 - (high - low)) / 2.0);
-        Self {
-            low: low - room,
-            high: high + room,
-            has_zero,
-            start: 0.0,
-            end: 1.0,
-        }
+        Self { low: low - room, high: high + room, has_zero, start: 0.0, end: 1.0 }
     }
 
     /// The same axis between two places on the drawing.
@@ -72,10 +66,7 @@ impl Scale {
         if self.has_zero {
             // Next to it there is no room for another label.
             least += ROOM * span;
-            ticks.push(Tick {
-                value: 0.0,
-                label: Some("0".into()),
-            });
+            ticks.push(Tick { value: 0.0, label: Some("0".into()) });
         }
         for power in self.low.floor() as i32..=self.high.floor() as i32 {
             for digit in 1..=9 {
@@ -88,10 +79,7 @@ impl Scale {
                 let is_shown = digit == 1 || span < 7.0;
                 if is_shown && (least..=self.high).contains(&log) {
                     let value = f64::from(digit) * 10f64.powi(power);
-                    ticks.push(Tick {
-                        value,
-                        label: is_labelled.then(|| power_text(digit, power)),
-                    });
+                    ticks.push(Tick { value, label: is_labelled.then(|| power_text(digit, power)) });
                 }
             }
         }

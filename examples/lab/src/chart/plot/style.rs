@@ -22,44 +22,14 @@ pub struct Style<'a> {
 const METHODS: [Style; 11] = [
     style(NONE, "no scattering", "#777777", Marker::Plus),
     style(COPY, "copy", "#777777", Marker::Cross),
-    style(
-        "screen_exact",
-        "screen space, exact sum",
-        "#222222",
-        Marker::Diamond,
-    ),
-    style(
-        "screen_planned",
-        "screen space, a plan",
-        "#0072b2",
-        Marker::Circle,
-    ),
-    style(
-        "texture_separable",
-        "texture space, separable",
-        "#009e73",
-        Marker::Square,
-    ),
-    style(
-        "texture_cascade",
-        "texture space, cascade",
-        "#44aa99",
-        Marker::Star,
-    ),
+    style("screen_exact", "screen space, exact sum", "#222222", Marker::Diamond),
+    style("screen_planned", "screen space, a plan", "#0072b2", Marker::Circle),
+    style("texture_separable", "texture space, separable", "#009e73", Marker::Square),
+    style("texture_cascade", "texture space, cascade", "#44aa99", Marker::Star),
     style("texture_2d", "texture space, 2-D", "#117733", Marker::Plus),
     style("jimenez_2009", "Jimenez 2009", "#e69f00", Marker::Pentagon),
-    style(
-        "jimenez_separable",
-        "Jimenez separable",
-        "#d55e00",
-        Marker::Up,
-    ),
-    style(
-        "fitted_separable",
-        "fitted separable",
-        "#cc5fa0",
-        Marker::Down,
-    ),
+    style("jimenez_separable", "Jimenez separable", "#d55e00", Marker::Up),
+    style("fitted_separable", "fitted separable", "#cc5fa0", Marker::Down),
     style("burley_disk", "Burley disk", "#6a3d9a", Marker::Cross),
 ];
 
@@ -78,12 +48,7 @@ const fn style(
     color: &'static str,
     marker: Marker,
 ) -> Style<'static> {
-    Style {
-        method,
-        title,
-        color,
-        marker,
-    }
+    Style { method, title, color, marker }
 }
 
 /// Each name once, in the order that they come in.
@@ -99,22 +64,13 @@ pub fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 
 /// The styles of some methods, each once: the known ones first, then others as they come.
 pub fn styles<'a>(methods: impl Iterator<Item = &'a str>) -> Vec<Style<'a>> {
-    let (known, others): (Vec<_>, Vec<_>) = distinct(methods)
+    let (known, others): (Vec<_>, Vec<_>) =
+        distinct(methods).into_iter().partition(|name| METHODS.iter().any(|style| style.method == *name));
+    let known = METHODS.into_iter().filter(|style| known.contains(&style.method));
+    let others = others
         .into_iter()
-        .partition(|name| METHODS.iter().any(|style| style.method == *name));
-    let known = METHODS
-        .into_iter()
-        .filter(|style| known.contains(&style.method));
-    let others =
-        others
-            .into_iter()
-            .zip(OTHERS.into_iter().cycle())
-            .map(|(method, (color, marker))| Style {
-                method,
-                title: method,
-                color,
-                marker,
-            });
+        .zip(OTHERS.into_iter().cycle())
+        .map(|(method, (color, marker))| Style { method, title: method, color, marker });
     known.chain(others).collect()
 }
 
@@ -131,11 +87,7 @@ mod tests {
 
     #[test]
     fn every_method_has_a_look_of_its_own() {
-        let looks: Vec<_> = METHODS
-            .iter()
-            .map(|style| (style.color, style.marker))
-            .chain(OTHERS)
-            .collect();
+        let looks: Vec<_> = METHODS.iter().map(|style| (style.color, style.marker)).chain(OTHERS).collect();
         for (i, look) in looks.iter().enumerate() {
             assert!(!looks[..i].contains(look), "{look:?}");
         }

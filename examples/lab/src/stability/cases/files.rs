@@ -52,12 +52,7 @@ pub fn cases(quick: bool) -> Vec<Case> {
         })
     };
     let step = if quick { 16 << 10 } else { 1 << 10 };
-    let damaged = move || {
-        [cut(step), containers(), bytes(), images()]
-            .into_iter()
-            .flatten()
-            .collect()
-    };
+    let damaged = move || [cut(step), containers(), bytes(), images()].into_iter().flatten().collect();
     let lies = || values().into_iter().chain(nodes()).collect();
     vec![
         case(
@@ -128,15 +123,9 @@ impl Attempt {
         };
         let grown = before
             .zip(memory_kib())
-            .and_then(|([now, peak], [_, later])| {
-                (later > peak).then(|| later.saturating_sub(now))
-            });
-        let greedy = grown
-            .filter(|kib| *kib > MAX_KIB)
-            .map(|kib| format!("took {} MiB", kib >> 10));
-        fault
-            .or(greedy)
-            .map(|fault| format!("{} {fault}", self.name))
+            .and_then(|([now, peak], [_, later])| (later > peak).then(|| later.saturating_sub(now)));
+        let greedy = grown.filter(|kib| *kib > MAX_KIB).map(|kib| format!("took {} MiB", kib >> 10));
+        fault.or(greedy).map(|fault| format!("{} {fault}", self.name))
     }
 }
 
@@ -156,9 +145,7 @@ fn cut(step: usize) -> Vec<Attempt> {
     let open = lengths.map(|n| Attempt::gltf(format!("{n} bytes"), Refuse, HEAD[..n].to_vec()));
     let json_end = 20 + u32::from_le_bytes([HEAD[12], HEAD[13], HEAD[14], HEAD[15]]) as usize;
     let (json, bytes) = (&HEAD[20..json_end], &HEAD[json_end + 8..]);
-    let of_json = (0..json.len())
-        .step_by(step.min(1024))
-        .map(|n| (&json[..n], bytes));
+    let of_json = (0..json.len()).step_by(step.min(1024)).map(|n| (&json[..n], bytes));
     let of_bytes = (0..bytes.len()).step_by(step).map(|n| (json, &bytes[..n]));
     let closed = of_json.chain(of_bytes).map(|(json, bytes)| {
         let name = format!("{} bytes of JSON, {} of data", json.len(), bytes.len());
@@ -195,25 +182,16 @@ fn containers() -> Vec<Attempt> {
         ("a chunk of 4 GiB", with(end, &[255; 4])),
         ("no UTF-8", with(24, &[0xff])),
         ("a byte order mark", glb(&marked, &whole[end + 8..])),
-        (
-            "no chunk of bytes",
-            with(8, &(end as u32).to_le_bytes())[..end].to_vec(),
-        ),
+        ("no chunk of bytes", with(8, &(end as u32).to_le_bytes())[..end].to_vec()),
         ("JSON alone", Model::default().json.to_string().into_bytes()),
         ("a string that is JSON", b"\"glTF\"".to_vec()),
         ("a list", b"[]".to_vec()),
         ("an object", b"{}".to_vec()),
         ("an unfinished object", b"{\"asset\": {".to_vec()),
-        (
-            "100000 brackets",
-            [b"[".repeat(100_000), b"]".repeat(100_000)].concat(),
-        ),
+        ("100000 brackets", [b"[".repeat(100_000), b"]".repeat(100_000)].concat()),
         ("100000 braces", b"{\"a\":".repeat(100_000)),
     ];
-    refused
-        .into_iter()
-        .map(|(name, bytes)| Attempt::gltf(name, Refuse, bytes))
-        .collect()
+    refused.into_iter().map(|(name, bytes)| Attempt::gltf(name, Refuse, bytes)).collect()
 }
 
 /// What a reader must do; places in the JSON of [`Model`], where * stands for 0 to 3; and values for them,
@@ -275,10 +253,7 @@ const SHORT: [(&str, &str); 5] = [
         "-1 0.5 \"4\" 1e30 1048576 4294967295 1099511627776 9223372036854775807 18446744073709551615",
     ),
     ("INDICES", "9 -1 4294967295 18446744073709551615 \"0\""),
-    (
-        "SPARSE",
-        r#""indices":{"bufferView":3,"componentType":5123},"values":{"bufferView":0}"#,
-    ),
+    ("SPARSE", r#""indices":{"bufferView":3,"componentType":5123},"values":{"bufferView":0}"#),
     ("BYTES", "data:application/octet-stream"),
     ("PROFILE", "subsurface_profile"),
 ];
@@ -296,9 +271,7 @@ take /gaussians/0/weight = [7,7,7] [1e-30,1e-30,1e-30]
 /// A model for each value of a table.
 fn told(table: &str, base: &Model) -> Vec<(String, Must, Model)> {
     let mut models = Vec::new();
-    let table = SHORT.iter().fold(table.to_owned(), |table, (short, long)| {
-        table.replace(short, long)
-    });
+    let table = SHORT.iter().fold(table.to_owned(), |table, (short, long)| table.replace(short, long));
     for line in table.lines().filter(|line| !line.is_empty()) {
         let (what, values) = line.split_once(" = ").expect("places and values");
         let mut words = what.split(' ');
@@ -313,10 +286,7 @@ fn told(table: &str, base: &Model) -> Vec<(String, Must, Model)> {
         for place in all {
             for value in values.split(' ') {
                 let mut model = base.clone();
-                model.set(
-                    &place,
-                    serde_json::from_str(value).expect("values are JSON"),
-                );
+                model.set(&place, serde_json::from_str(value).expect("values are JSON"));
                 models.push((format!("{place} of {value}"), must, model));
             }
         }
@@ -327,9 +297,7 @@ fn told(table: &str, base: &Model) -> Vec<(String, Must, Model)> {
 fn values() -> Vec<Attempt> {
     let mut attempts = vec![
         Attempt::model("no scenes and no nodes", Refuse, |m| {
-            ["/scene", "/scenes", "/nodes"]
-                .iter()
-                .for_each(|place| m.set(place, Value::Null));
+            ["/scene", "/scenes", "/nodes"].iter().for_each(|place| m.set(place, Value::Null));
         }),
         Attempt::model("no vertices", Refuse, |m| {
             (0..3).for_each(|i| m.set(&format!("/accessors/{i}/count"), json!(0)));
@@ -351,42 +319,30 @@ fn beside(uri: &'static str) -> Attempt {
         let mut model = Model::default();
         model.set("/buffers/0/uri", json!(uri));
         let path = std::env::temp_dir().join(format!("stability-{}.gltf", std::process::id()));
-        let unwritable =
-            |e: std::io::Error| Error::new(path.display(), e, "a file that can be written");
+        let unwritable = |e: std::io::Error| Error::new(path.display(), e, "a file that can be written");
         std::fs::write(&path, model.json.to_string()).map_err(unwritable)?;
         let scene = Scene::load(&path);
         std::fs::remove_file(&path).map_err(unwritable)?;
         scene.map(|scene| flaw_of_scene(&scene))
     };
-    Attempt {
-        name: format!("bytes in {uri}"),
-        must: Refuse,
-        read: Box::new(read),
-    }
+    Attempt { name: format!("bytes in {uri}"), must: Refuse, read: Box::new(read) }
 }
 
 fn bytes() -> Vec<Attempt> {
     let mut attempts = Vec::new();
-    for (what, part) in [
-        ("position", Model::POSITIONS),
-        ("normal", Model::NORMALS),
-        ("UV", Model::UVS),
-    ] {
+    for (what, part) in [("position", Model::POSITIONS), ("normal", Model::NORMALS), ("UV", Model::UVS)] {
         let mut number = |must, x: f32| {
             attempts.push(Attempt::model(format!("a {what} of {x}"), must, |m| {
                 m.bytes[part.start..part.start + 4].copy_from_slice(&x.to_le_bytes());
             }));
         };
-        [f32::NAN, f32::INFINITY, f32::NEG_INFINITY]
-            .into_iter()
-            .for_each(|x| number(Refuse, x));
+        [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().for_each(|x| number(Refuse, x));
         // Numbers, if not of this world.
         let odd = [f32::MAX, f32::MIN, f32::MIN_POSITIVE, 1e-45, -0.0];
         odd.into_iter().for_each(|x| number(Either, x));
     }
-    let filled = |name, must, part: Range<usize>, with| {
-        Attempt::model(name, must, |m| m.bytes[part].fill(with))
-    };
+    let filled =
+        |name, must, part: Range<usize>, with| Attempt::model(name, must, |m| m.bytes[part].fill(with));
     let first = Model::INDICES.start..Model::INDICES.start + 1;
     attempts.extend([
         filled("normals of no length", Either, Model::NORMALS, 0),
@@ -396,9 +352,7 @@ fn bytes() -> Vec<Attempt> {
         filled("indices of 65535", Refuse, Model::INDICES, 255),
         filled("an index of as many vertices", Refuse, first, 4),
         Attempt::model("no bytes", Refuse, |m| m.bytes.clear()),
-        Attempt::model("a byte that is missing", Refuse, |m| {
-            m.bytes.truncate(Model::INDICES.end - 4)
-        }),
+        Attempt::model("a byte that is missing", Refuse, |m| m.bytes.truncate(Model::INDICES.end - 4)),
     ]);
     attempts
 }
@@ -406,46 +360,25 @@ fn bytes() -> Vec<Attempt> {
 /// Images that are too large, cut short, or none.
 fn images() -> Vec<Attempt> {
     let [png, jpeg] = [ImageFormat::Png, ImageFormat::Jpeg].map(picture);
-    let with =
-        |name: String, must, picture: &[u8]| Attempt::model(name, must, |m| m.set_picture(picture));
+    let with = |name: String, must, picture: &[u8]| Attempt::model(name, must, |m| m.set_picture(picture));
     let mut attempts = vec![
         with("a JPEG".into(), Take, &jpeg),
         with("text for a picture".into(), Refuse, b"no picture"),
         with("a GIF".into(), Refuse, b"GIF89a\x01\0\x01\0\0\0\0;"),
     ];
-    attempts.extend(
-        (0..png.len() - 12).map(|n| with(format!("{n} bytes of a PNG"), Refuse, &png[..n])),
-    );
+    attempts.extend((0..png.len() - 12).map(|n| with(format!("{n} bytes of a PNG"), Refuse, &png[..n])));
     // What is missing of a JPEG may be drawn as grey.
-    attempts
-        .extend((0..jpeg.len()).map(|n| with(format!("{n} bytes of a JPEG"), Either, &jpeg[..n])));
-    for size in [
-        [0, 0],
-        [0, 2],
-        [100_000; 2],
-        [1 << 30, 1],
-        [1, 1 << 30],
-        [i32::MAX as u32; 2],
-        [u32::MAX; 2],
-    ] {
-        attempts.push(with(
-            format!("a PNG that claims {size:?}"),
-            Refuse,
-            &claiming(&png, size),
-        ));
+    attempts.extend((0..jpeg.len()).map(|n| with(format!("{n} bytes of a JPEG"), Either, &jpeg[..n])));
+    for size in
+        [[0, 0], [0, 2], [100_000; 2], [1 << 30, 1], [1, 1 << 30], [i32::MAX as u32; 2], [u32::MAX; 2]]
+    {
+        attempts.push(with(format!("a PNG that claims {size:?}"), Refuse, &claiming(&png, size)));
     }
     // Four thousand million pixels, all of them missing but four.
     let mut large = jpeg.clone();
-    let frame = large
-        .windows(2)
-        .position(|w| w == [0xff, 0xc0])
-        .expect("a JPEG has a frame");
+    let frame = large.windows(2).position(|w| w == [0xff, 0xc0]).expect("a JPEG has a frame");
     large[frame + 5..frame + 9].fill(255);
-    attempts.push(with(
-        "a JPEG that claims 65535x65535".into(),
-        Refuse,
-        &large,
-    ));
+    attempts.push(with("a JPEG that claims 65535x65535".into(), Refuse, &large));
     attempts
 }
 
@@ -456,9 +389,7 @@ fn claiming(png: &[u8], [width, height]: [u32; 2]) -> Vec<u8> {
     png[16..20].copy_from_slice(&width.to_be_bytes());
     png[20..24].copy_from_slice(&height.to_be_bytes());
     let sum = !png[12..29].iter().fold(!0u32, |sum, byte| {
-        (0..8).fold(sum ^ u32::from(*byte), |sum, _| {
-            (sum >> 1) ^ (0xedb8_8320 & (sum & 1).wrapping_neg())
-        })
+        (0..8).fold(sum ^ u32::from(*byte), |sum, _| (sum >> 1) ^ (0xedb8_8320 & (sum & 1).wrapping_neg()))
     });
     png[29..33].copy_from_slice(&sum.to_be_bytes());
     png
@@ -476,61 +407,27 @@ fn nodes() -> Vec<Attempt> {
     };
     let doubled = |i: usize| json!({"children": [i], "scale": [4, 4, 4]});
     let wide = json!({"children": (1..100_001).collect::<Vec<_>>()});
-    let fan = [wide]
-        .into_iter()
-        .chain(std::iter::repeat_n(json!({}), 99_999))
-        .chain([mesh()]);
+    let fan = [wide].into_iter().chain(std::iter::repeat_n(json!({}), 99_999)).chain([mesh()]);
     let circle = json!({"mesh": 0, "children": [0]});
     vec![
         tree("a node that is its own child", Refuse, vec![circle.clone()]),
         tree("two nodes in a circle", Refuse, vec![to(1), circle.clone()]),
-        tree(
-            "a child twice",
-            Refuse,
-            vec![json!({"children": [1, 1]}), mesh()],
-        ),
-        tree(
-            "a child of two",
-            Refuse,
-            vec![json!({"children": [1, 2]}), to(2), mesh()],
-        ),
+        tree("a child twice", Refuse, vec![json!({"children": [1, 1]}), mesh()]),
+        tree("a child of two", Refuse, vec![json!({"children": [1, 2]}), to(2), mesh()]),
         tree("a circle of 100000", Refuse, chain(100_000, &to, to(0))),
         tree("100000 nodes deep", Take, chain(100_000, &to, mesh())),
         tree("100000 children", Take, fan.collect()),
         // Not finite, the further down.
-        tree(
-            "200 nodes that each double and double",
-            Refuse,
-            chain(200, &doubled, mesh()),
-        ),
+        tree("200 nodes that each double and double", Refuse, chain(200, &doubled, mesh())),
         // Every doubling of a tree that shares its nodes would double what there is to draw.
-        tree(
-            "shared children, 60 deep",
-            Refuse,
-            chain(60, &|i| json!({"children": [i, i]}), mesh()),
-        ),
+        tree("shared children, 60 deep", Refuse, chain(60, &|i| json!({"children": [i, i]}), mesh())),
         Attempt::model("a circle that no scene names", Refuse, |m| {
             m.set("/scene", Value::Null);
             m.set("/scenes", Value::Null);
-            m.set(
-                "/nodes",
-                json!([{"mesh": 0, "children": [1]}, {"children": [0]}]),
-            );
+            m.set("/nodes", json!([{"mesh": 0, "children": [1]}, {"children": [0]}]));
         }),
-        drawn(
-            "a mesh of 10000 triangles, 3000 times",
-            Refuse,
-            4,
-            30_000,
-            3000,
-        ),
-        drawn(
-            "a strip of 30000 triangles, 3000 times",
-            Refuse,
-            5,
-            30_000,
-            3000,
-        ),
+        drawn("a mesh of 10000 triangles, 3000 times", Refuse, 4, 30_000, 3000),
+        drawn("a strip of 30000 triangles, 3000 times", Refuse, 5, 30_000, 3000),
         drawn("30000 points, 30000 times", Refuse, 0, 30_000, 30_000),
         drawn("1000 triangles, 300 times", Take, 4, 3000, 300),
     ]
@@ -541,38 +438,24 @@ fn drawn(name: &str, must: Must, mode: u32, corners: usize, nodes: usize) -> Att
     Attempt::model(name, must, |m| {
         let numbers = (0..3 * corners).flat_map(|i| (i as f32).to_le_bytes());
         m.bytes = numbers.collect();
-        m.set(
-            "/meshes/0/primitives/0",
-            json!({"attributes": {"POSITION": 0}, "mode": mode}),
-        );
+        m.set("/meshes/0/primitives/0", json!({"attributes": {"POSITION": 0}, "mode": mode}));
         m.set("/nodes", Value::Array(vec![json!({"mesh": 0}); nodes]));
         m.set("/scenes/0/nodes", json!((0..nodes).collect::<Vec<_>>()));
         m.set("/accessors/0/count", json!(corners));
         m.set("/accessors", json!([m.json["accessors"][0]]));
-        m.set(
-            "/bufferViews",
-            json!([{"buffer": 0, "byteLength": m.bytes.len()}]),
-        );
+        m.set("/bufferViews", json!([{"buffer": 0, "byteLength": m.bytes.len()}]));
         m.set("/buffers/0/byteLength", json!(m.bytes.len()));
-        ["/images", "/textures", "/materials"]
-            .iter()
-            .for_each(|place| m.set(place, Value::Null));
+        ["/images", "/textures", "/materials"].iter().for_each(|place| m.set(place, Value::Null));
     })
 }
 
 /// Profiles as JSON.
 fn profiles() -> Vec<Attempt> {
-    let base = Model {
-        json: json!(Profile::SKIN),
-        bytes: vec![],
-    };
+    let base = Model { json: json!(Profile::SKIN), bytes: vec![] };
     let skin = base.json.to_string();
     let many = |n: usize| {
         let mut model = base.clone();
-        model.set(
-            "/gaussians",
-            Value::Array(vec![base.json["gaussians"][0].clone(); n]),
-        );
+        model.set("/gaussians", Value::Array(vec![base.json["gaussians"][0].clone(); n]));
         model.json.to_string()
     };
     let mut texts: Vec<(Must, String)> = vec![

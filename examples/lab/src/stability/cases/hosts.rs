@@ -14,13 +14,7 @@ use crate::stability::trial::{largest, merge};
 use crate::synthetic::{View, sphere};
 
 pub fn cases(quick: bool) -> Vec<Case> {
-    vec![
-        resized(quick),
-        switched(quick),
-        interleaved(),
-        lost(),
-        leaks(quick),
-    ]
+    vec![resized(quick), switched(quick), interleaved(), lost(), leaks(quick)]
 }
 
 /// A ball of skin lit from one side; small, since it is drawn often.
@@ -60,9 +54,7 @@ fn resized(quick: bool) -> Case {
         let mut anew: Vec<Vec<Pixels>> = Vec::new();
         for ball in &balls {
             let mut methods = methods(gpu, &lab.plan)?;
-            let of_all = methods
-                .iter_mut()
-                .map(|(_, method)| method.scatter(gpu, ball));
+            let of_all = methods.iter_mut().map(|(_, method)| method.scatter(gpu, ball));
             anew.push(of_all.collect::<Result<_, _>>()?);
         }
         let mut kept = methods(gpu, &lab.plan)?;
@@ -71,10 +63,7 @@ fn resized(quick: bool) -> Case {
             // Every fifth frame skips one, so that each size follows on different ones.
             let i = (frame + frame / 5) % balls.len();
             for ((name, method), anew) in kept.iter_mut().zip(&anew[i]) {
-                merge(
-                    &mut figures,
-                    [(*name, apart(&method.scatter(gpu, &balls[i])?, anew))],
-                );
+                merge(&mut figures, [(*name, apart(&method.scatter(gpu, &balls[i])?, anew))]);
             }
         }
         Ok(figures.into())
@@ -103,10 +92,7 @@ fn switched(quick: bool) -> Case {
             // Steps that have no divisor in common with the count come by all of them.
             let i = frame * [1, 3, 5, 7][frame / count % 4] % count;
             let (name, method) = &mut kept[i];
-            merge(
-                &mut figures,
-                [(*name, apart(&method.scatter(gpu, &shared)?, &alone[i]))],
-            );
+            merge(&mut figures, [(*name, apart(&method.scatter(gpu, &shared)?, &alone[i]))]);
         }
         Ok(figures.into())
     })
@@ -121,9 +107,8 @@ fn interleaved() -> Case {
         let gpu = &lab.gpu;
         let balls = [[48, 40], [31, 57]].map(|size| ball(size, gpu));
         let mut figures = Figures::new();
-        for ((name, mut a), (_, mut b)) in methods(gpu, &lab.plan)?
-            .into_iter()
-            .zip(methods(gpu, &lab.plan)?)
+        for ((name, mut a), (_, mut b)) in
+            methods(gpu, &lab.plan)?.into_iter().zip(methods(gpu, &lab.plan)?)
         {
             let alone = [a.scatter(gpu, &balls[0])?, b.scatter(gpu, &balls[1])?];
             // Each now has the other's frame.
@@ -134,10 +119,7 @@ fn interleaved() -> Case {
                 b.render(encoder, &balls[0].output)
             })?;
             for (ball, alone) in balls.iter().zip(&alone) {
-                merge(
-                    &mut figures,
-                    [(name, apart(&gpu.read(&ball.output), alone))],
-                );
+                merge(&mut figures, [(name, apart(&gpu.read(&ball.output), alone))]);
             }
         }
         Ok(figures.into())
@@ -156,9 +138,7 @@ fn lost() -> Case {
             gpu.device.on_uncaptured_error(std::sync::Arc::new(|_| {}));
             let ball = ball([48, 40], &gpu);
             let mut methods = ours(&gpu, &lab.plan)?;
-            let of_all = methods
-                .iter_mut()
-                .map(|(_, method)| method.scatter(&gpu, &ball));
+            let of_all = methods.iter_mut().map(|(_, method)| method.scatter(&gpu, &ball));
             let before = of_all.collect::<Result<Vec<_>, _>>()?;
             gpu.device.destroy();
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -196,45 +176,33 @@ fn leaks(quick: bool) -> Case {
         why: "0.25 KiB a frame is 53 MiB in an hour at 60 Hz. A frame's settings take 2 KiB, its \
               textures here 8 KiB each.",
     };
-    Case::new(
-        format!("{frames} frames, what they leave"),
-        what,
-        bound,
-        move |lab: &Lab| {
-            let gpu = &lab.gpu;
-            let balls = [[32, 32], [24, 40]].map(|size| ball(size, gpu));
-            let mut figures = Figures::new();
-            for (name, mut method) in methods(gpu, &lab.plan)? {
-                let mut frame = 0;
-                let mut go_on = |frames: usize| -> Result<[f64; 2], Error> {
-                    for _ in 0..frames {
-                        let ball = &balls[frame / 10 % 2];
-                        method.prepare(gpu, ball)?;
-                        gpu.run(|encoder| method.render(encoder, &ball.output))?;
-                        frame += 1;
-                    }
-                    Ok(bytes(gpu))
-                };
-                let [start, middle, end] =
-                    [go_on(frames / 3)?, go_on(frames / 2)?, go_on(frames / 2)?];
-                let growth = |i: usize| (middle[i] - start[i]).min(end[i] - middle[i]).max(0.0);
-                figures.push((
-                    name,
-                    growth(0).max(growth(1)) / 1024.0 / (frames / 2) as f64,
-                ));
-            }
-            Ok(figures.into())
-        },
-    )
+    Case::new(format!("{frames} frames, what they leave"), what, bound, move |lab: &Lab| {
+        let gpu = &lab.gpu;
+        let balls = [[32, 32], [24, 40]].map(|size| ball(size, gpu));
+        let mut figures = Figures::new();
+        for (name, mut method) in methods(gpu, &lab.plan)? {
+            let mut frame = 0;
+            let mut go_on = |frames: usize| -> Result<[f64; 2], Error> {
+                for _ in 0..frames {
+                    let ball = &balls[frame / 10 % 2];
+                    method.prepare(gpu, ball)?;
+                    gpu.run(|encoder| method.render(encoder, &ball.output))?;
+                    frame += 1;
+                }
+                Ok(bytes(gpu))
+            };
+            let [start, middle, end] = [go_on(frames / 3)?, go_on(frames / 2)?, go_on(frames / 2)?];
+            let growth = |i: usize| (middle[i] - start[i]).min(end[i] - middle[i]).max(0.0);
+            figures.push((name, growth(0).max(growth(1)) / 1024.0 / (frames / 2) as f64));
+        }
+        Ok(figures.into())
+    })
 }
 
 /// Of the process, and of the device; 0 where it cannot be told.
 fn bytes(gpu: &Gpu) -> [f64; 2] {
     let statm = fs::read_to_string("/proc/self/statm").unwrap_or_default();
-    let pages = statm
-        .split(' ')
-        .nth(1)
-        .and_then(|pages| pages.parse::<f64>().ok());
+    let pages = statm.split(' ').nth(1).and_then(|pages| pages.parse::<f64>().ok());
     let report = gpu.device.generate_allocator_report();
     [
         // Where pages are larger than on all that is usual, the figure is too small by as much.

@@ -32,9 +32,7 @@ pub fn cases(quick: bool) -> Vec<Case> {
 fn flat(side: u32, id: impl Fn(DVec2) -> u32) -> GBuffer {
     let view = View::orthographic([side; 2], PX_PER_MM);
     let to_edge = DVec2::from_angle(-27f64.to_radians());
-    let skin = plane(DVec3::Z, 300.0, |p| {
-        DVec3::splat(step(to_edge.rotate(p.truncate()).x, 0.0))
-    });
+    let skin = plane(DVec3::Z, 300.0, |p| DVec3::splat(step(to_edge.rotate(p.truncate()).x, 0.0)));
     view.shoot(|origin, ray| {
         let hit = skin(origin, ray)?;
         let id = id(to_edge.rotate(hit.point.truncate()));
@@ -45,8 +43,7 @@ fn flat(side: u32, id: impl Fn(DVec2) -> u32) -> GBuffer {
 /// Half of all pixels, at random: a hash of the pixel that a place lies in.
 fn at_random(place_mm: DVec2) -> bool {
     let pixel = (place_mm * PX_PER_MM).floor().as_ivec2();
-    let mut bits =
-        (pixel.x as u32).wrapping_mul(0x9e37_79b1) ^ (pixel.y as u32).wrapping_mul(0x85eb_ca77);
+    let mut bits = (pixel.x as u32).wrapping_mul(0x9e37_79b1) ^ (pixel.y as u32).wrapping_mul(0x85eb_ca77);
     bits = (bits ^ (bits >> 15)).wrapping_mul(0x2c1b_3c6d);
     (bits ^ (bits >> 12)) & 1 == 0
 }
@@ -90,19 +87,10 @@ fn masks(quick: bool) -> Vec<Case> {
     };
     vec![
         case("ids meet in a line", PROMISE, [0.015, 0.018], |p| p.y < 0.0),
-        case(
-            "half of the ids, at random",
-            GRADIENT,
-            [0.026, 0.037],
-            at_random,
-        )
-        .pictured(false),
+        case("half of the ids, at random", GRADIENT, [0.026, 0.037], at_random).pictured(false),
         case("a net of ids", GRADIENT, [0.022, 0.027], threads),
         case("straps of ids", GRADIENT, [0.0175, 0.025], straps).pictured(false),
-        case("a hole of ids", GRADIENT, [0.0195, 0.0195], |p| {
-            p.length() < 3.0
-        })
-        .pictured(false),
+        case("a hole of ids", GRADIENT, [0.0195, 0.0195], |p| p.length() < 3.0).pictured(false),
         case("patches of ids", GRADIENT, [0.0205, 0.045], patches).pictured(false),
     ]
 }
@@ -118,12 +106,7 @@ fn odd_pixels(ratio: f64, quick: bool, [of_quick, of_full]: [f64; 2]) -> Case {
         let size = (2.0 * (NEAR_MM + REACH_MM) * px).as_uvec2().to_array();
         let mut view = View::orthographic(size, px_per_mm);
         view.projection.x_axis.x *= ratio;
-        let scene = Scene(vec![Surface::edge(
-            Form::facing(1.0),
-            across,
-            0.0,
-            blur_mm2,
-        )]);
+        let scene = Scene(vec![Surface::edge(Form::facing(1.0), across, 0.0, blur_mm2)]);
         let crop = Crop::middle(&view, (2.0 * NEAR_MM * px).as_uvec2().to_array());
         Trial::new(scene, view, crop, Truth::Closed)
     };
@@ -135,9 +118,7 @@ fn odd_pixels(ratio: f64, quick: bool, [of_quick, of_full]: [f64; 2]) -> Case {
         before the frame is stretched.";
     let scales: &[f64] = if quick { &[4.0] } else { &[4.0, 1.5, 3.0, 6.0] };
     Case::new(format!("pixels {ratio} : 1"), what, PROMISE, move |lab| {
-        let frames = scales
-            .iter()
-            .flat_map(|s| [0.0, 45.0, 90.0].map(|edge| (*s, edge)));
+        let frames = scales.iter().flat_map(|s| [0.0, 45.0, 90.0].map(|edge| (*s, edge)));
         worst_of(frames.map(|(scale, edge)| frame(scale, edge).run(lab)))
     })
     .known([known(PLAN, if quick { of_quick } else { of_full }, why)])

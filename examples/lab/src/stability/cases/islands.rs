@@ -35,12 +35,7 @@ pub struct Square {
 impl Square {
     /// The edge's normal is at `degrees` from x.
     pub fn new(degrees: f64, soft_mm: f64, quick: bool) -> Self {
-        Self {
-            quick,
-            across: DVec2::from_angle(degrees.to_radians()),
-            soft_mm,
-            look: Shared::new(),
-        }
+        Self { quick, across: DVec2::from_angle(degrees.to_radians()), soft_mm, look: Shared::new() }
     }
 
     /// Irradiance on the square, or on the one behind it, which is lit where this one is not.
@@ -88,11 +83,7 @@ impl Island {
     /// A part of the square, by the mm that a texel steps along u and along v.
     pub fn new(part_mm: [DVec2; 2], texel_mm: [DVec2; 2]) -> Self {
         let [u, v] = texel_mm;
-        Self {
-            part_mm,
-            to_texels: DAffine2::from_mat2(DMat2::from_cols(u, v).inverse()),
-            is_behind: false,
-        }
+        Self { part_mm, to_texels: DAffine2::from_mat2(DMat2::from_cols(u, v).inverse()), is_behind: false }
     }
 
     /// All of the square.
@@ -103,10 +94,7 @@ impl Island {
 
     /// The same of the square behind.
     pub fn behind(self) -> Self {
-        Self {
-            is_behind: true,
-            ..self
-        }
+        Self { is_behind: true, ..self }
     }
 
     fn holds(&self, on_square: DVec2) -> bool {
@@ -150,10 +138,7 @@ impl Layout {
             island.to_texels.translation += place + GUTTER - least;
         }
         let size = place * UVec2::new(columns, rows).as_dvec2();
-        Self {
-            size: size.as_uvec2().to_array(),
-            islands,
-        }
+        Self { size: size.as_uvec2().to_array(), islands }
     }
 
     /// The square behind is drawn over a part of the atlas of this one.

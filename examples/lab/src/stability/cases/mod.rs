@@ -63,8 +63,7 @@ pub fn all(quick: bool) -> Vec<Case> {
         ("sizes", sizes::cases(quick)),
         ("hosts", hosts::cases(quick)),
     ];
-    let named =
-        |(group, cases): (_, Vec<Case>)| cases.into_iter().map(move |c| Case { group, ..c });
+    let named = |(group, cases): (_, Vec<Case>)| cases.into_iter().map(move |c| Case { group, ..c });
     groups.into_iter().flat_map(named).collect()
 }
 

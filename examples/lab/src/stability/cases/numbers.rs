@@ -27,19 +27,14 @@ pub fn cases(quick: bool) -> Vec<Case> {
     if !quick {
         cases.push(large());
     }
-    cases.extend(
-        [("no width", 0.0), ("a nanometre", 1e-6), ("a metre", 1e3)].map(|w| width(w, side)),
-    );
+    cases.extend([("no width", 0.0), ("a nanometre", 1e-6), ("a metre", 1e3)].map(|w| width(w, side)));
     cases.extend([("micrometres", 1e-3), ("metres", 1e3)].map(|u| unit(u, side)));
     cases
 }
 
 /// The same truth at these pixels.
 fn all_are(pixels: Vec<usize>, light: f64) -> Known {
-    pixels
-        .into_iter()
-        .map(|i| (i, DVec3::splat(light)))
-        .collect()
+    pixels.into_iter().map(|i| (i, DVec3::splat(light))).collect()
 }
 
 /// A ball of 12 mm in perspective at 3 px/mm.
@@ -66,22 +61,14 @@ fn constant(light: f32, side: u32) -> Case {
     };
     let what = "A ball of 12 mm before a background of the same light, 3 px/mm: largest \
         difference to that light, as a share of it unless it is 0.";
-    Case::new(
-        format!("light of {light} throughout"),
-        what,
-        bound,
-        move |lab| {
-            let e = f64::from(f16::from_f32(light));
-            let texels = Texels::of(&ball(side, |_| e), e);
-            let results = lab.scatter_both(&texels.upload(&lab.gpu))?;
-            let figures = worst(&results, &all_are(texels.skin(), e)).into_iter();
-            let whole = if light == 0.0 { 1.0 } else { e };
-            Ok(figures
-                .map(|(m, f)| (m, f / whole))
-                .collect::<Figures>()
-                .into())
-        },
-    )
+    Case::new(format!("light of {light} throughout"), what, bound, move |lab| {
+        let e = f64::from(f16::from_f32(light));
+        let texels = Texels::of(&ball(side, |_| e), e);
+        let results = lab.scatter_both(&texels.upload(&lab.gpu))?;
+        let figures = worst(&results, &all_are(texels.skin(), e)).into_iter();
+        let whole = if light == 0.0 { 1.0 } else { e };
+        Ok(figures.map(|(m, f)| (m, f / whole)).collect::<Figures>().into())
+    })
 }
 
 /// A flat face of skin, `side` pixels at 6 px/mm; no skin on the last sixth of each row.
@@ -108,10 +95,7 @@ fn saturated(side: u32) -> Case {
         let edge = |light: f64| face(side, |p| if p.dot(across) < 0.0 { light } else { 0.0 });
         let scatter = |light| lab.scatter_both(&edge(light).upload(&lab.gpu));
         let (dim, mut bright) = (scatter(1.0)?, scatter(65504.0)?);
-        bright
-            .iter_mut()
-            .flat_map(|(_, r)| r)
-            .for_each(|e| *e /= 65504.0);
+        bright.iter_mut().flat_map(|(_, r)| r).for_each(|e| *e /= 65504.0);
         Ok(apart(&bright, &dim, &edge(1.0).skin()).into())
     })
     .known([known(PLAN, 0.0035, why)])
@@ -133,11 +117,7 @@ fn lost_light(side: u32) -> Vec<Case> {
         let lost = |r: &[Vec3]| r.iter().filter(|e| !e.is_finite()).count() as f64;
         results.iter().map(|(m, r)| (*m, lost(r))).collect()
     };
-    let case = |name: &str,
-                value: f32,
-                kind: &str,
-                bound,
-                measure: fn(&Results, &Known) -> Figures| {
+    let case = |name: &str, value: f32, kind: &str, bound, measure: fn(&Results, &Known) -> Figures| {
         let what = "Flat skin under light of 1, but for four pixels far from each other that are \
             NaN or infinite. Pixels lost: how many of the result are not finite. What changes: \
             largest difference to 1 on all of the skin; such a pixel should give nothing, and \
@@ -146,10 +126,7 @@ fn lost_light(side: u32) -> Vec<Case> {
             let texels = dotted(value, side);
             let results = lab.scatter_both(&texels.upload(&lab.gpu))?;
             let truth = all_are(texels.skin(), 1.0);
-            let crop = Crop {
-                first: [20, 20],
-                size: [56; 2],
-            };
+            let crop = Crop { first: [20, 20], size: [56; 2] };
             Ok(Outcome {
                 figures: measure(&results, &truth),
                 shown: Some(crop.show(side, &results, &truth)),
@@ -163,17 +140,11 @@ fn lost_light(side: u32) -> Vec<Case> {
         why: "one lost pixel becomes a patch in bloom, and can turn the frame black by automatic \
             exposure. Four were lost before; if there are more, scattering has spread them.",
     };
-    let values = [
-        ("NaN", f32::NAN),
-        ("infinity", f32::INFINITY),
-        ("minus infinity", f32::NEG_INFINITY),
-    ];
-    let lost =
-        values.map(|(name, value)| case(name, value, "pixels lost", few, lost).pictured(false));
+    let values = [("NaN", f32::NAN), ("infinity", f32::INFINITY), ("minus infinity", f32::NEG_INFINITY)];
+    let lost = values.map(|(name, value)| case(name, value, "pixels lost", few, lost).pictured(false));
     // Infinity looks as NaN does.
-    let changes = values.map(|(name, value)| {
-        case(name, value, "what changes", EVEN, worst).pictured(value.is_nan())
-    });
+    let changes =
+        values.map(|(name, value)| case(name, value, "what changes", EVEN, worst).pictured(value.is_nan()));
     lost.into_iter().chain(changes).collect()
 }
 
@@ -227,31 +198,22 @@ fn depths(side: u32) -> [Case; 5] {
                 }
             }
             let mut truth = all_are(texels.skin(), 1.0);
-            truth
-                .iter_mut()
-                .filter(|(i, _)| bad.contains(i))
-                .for_each(|(_, e)| *e = DVec3::ZERO);
+            truth.iter_mut().filter(|(i, _)| bad.contains(i)).for_each(|(_, e)| *e = DVec3::ZERO);
             let inputs = texels.upload(&lab.gpu);
             let mut results = lab.scatter(&inputs.frame(), &inputs.output)?;
             let mut figures = worst(&results, &truth);
             // Texels without skin take what is around them, which the final pass never asks for.
             let textured = lab.scatter_atlas(&inputs.atlas(), &inputs.output)?;
-            let in_atlas = truth
-                .iter()
-                .filter(|(i, _)| texels.positions_mm[*i][3] != 0.0);
+            let in_atlas = truth.iter().filter(|(i, _)| texels.positions_mm[*i][3] != 0.0);
             figures.extend(worst(&textured, &in_atlas.copied().collect()));
             results.extend(textured);
-            let crop = Crop {
-                first: [24, 24],
-                size: [56; 2],
-            };
+            let crop = Crop { first: [24, 24], size: [56; 2] };
             let shown = Some(crop.show(side, &results, &truth));
             Ok(Outcome { figures, shown })
         });
         // Infinity looks as NaN does, and -1 as 1.
         let looks_alike = value == f32::INFINITY || value == -1.0;
-        case.known(value.is_nan().then(|| known(ATLAS, f64::INFINITY, why)))
-            .pictured(!looks_alike)
+        case.known(value.is_nan().then(|| known(ATLAS, f64::INFINITY, why))).pictured(!looks_alike)
     })
 }
 
@@ -352,8 +314,7 @@ fn too_large() -> Case {
         let limit = gpu.device.limits().max_texture_dimension_2d;
         let size = [limit + 1, 1];
         let refused = gpu.check_size(size).err().map(|e| e.to_string());
-        let named =
-            refused.is_some_and(|e| e.starts_with("size: ") && e.contains(&limit.to_string()));
+        let named = refused.is_some_and(|e| e.starts_with("size: ") && e.contains(&limit.to_string()));
         let good = Texels::of(&waves([64; 2]), 0.0).upload(gpu);
         let mut figures = Vec::new();
         for (name, mut method) in methods(gpu, &lab.plan)? {
@@ -367,14 +328,7 @@ fn too_large() -> Case {
             let told = pollster::block_on(scope.pop()).is_some();
             let after = method.scatter(gpu, &good)?;
             let changed = before.iter().zip(&after).filter(|(a, b)| a != b).count();
-            figures.push((
-                name,
-                if named && told {
-                    changed as f64
-                } else {
-                    f64::INFINITY
-                },
-            ));
+            figures.push((name, if named && told { changed as f64 } else { f64::INFINITY }));
         }
         Ok(figures.into())
     })
@@ -397,10 +351,7 @@ fn width((name, sigma_mm): (&str, f32), side: u32) -> Case {
     };
     let bound = if narrow { EVEN } else { GRADIENT };
     Case::new(format!("a profile of {name}"), what, bound, move |lab| {
-        let profile = Profile::new(&[Gaussian {
-            variance_mm2: sigma_mm * sigma_mm,
-            weight: [1.0; 3],
-        }])?;
+        let profile = Profile::new(&[Gaussian { variance_mm2: sigma_mm * sigma_mm, weight: [1.0; 3] }])?;
         // No plan keeps 1/255 for a single Gaussian.
         let plan = Plan::new(&[profile], 0.01)?;
         let across = DVec2::from_angle(27f64.to_radians()).extend(0.0);
@@ -413,11 +364,7 @@ fn width((name, sigma_mm): (&str, f32), side: u32) -> Case {
         let texels = Texels::of(&g, 0.0);
         let inputs = texels.upload(&lab.gpu);
         let mut results: Results = vec![("none", lab.read(inputs.frame().irradiance))];
-        let methods = if sigma_mm == 0.0 {
-            ours(&lab.gpu, &plan)?
-        } else {
-            methods(&lab.gpu, &plan)?
-        };
+        let methods = if sigma_mm == 0.0 { ours(&lab.gpu, &plan)? } else { methods(&lab.gpu, &plan)? };
         for (name, mut method) in methods {
             method.scatter(&lab.gpu, &inputs)?;
             results.push((name, lab.read(&inputs.output)));
@@ -439,10 +386,7 @@ fn unit((name, mm_per_unit): (&str, f32), side: u32) -> Case {
     Case::new(format!("a scene in {name}"), what, EVEN, move |lab| {
         let to_light = DVec3::new(0.8, 0.0, 0.6);
         let in_mm = Texels::of(&ball(side, |n| n.dot(to_light).max(0.0)), 0.0);
-        let in_units = Texels {
-            mm_per_unit,
-            ..in_mm.clone()
-        };
+        let in_units = Texels { mm_per_unit, ..in_mm.clone() };
         let before = lab.scatter_both(&in_mm.upload(&lab.gpu))?;
         let after = lab.scatter_both(&in_units.upload(&lab.gpu))?;
         Ok(apart(&after, &before, &in_mm.skin()).into())

@@ -84,20 +84,8 @@ fn heads(quick: bool) -> Vec<Case> {
     };
     let touch = [known(PLAN, 0.21, COARSE), known(ATLAS, 0.3, ISLANDS)];
     vec![
-        case(
-            "a head in front of another",
-            12.0,
-            30.0,
-            LEAK,
-            Truth::Closed,
-        ),
-        case(
-            "heads side by side, one farther away",
-            20.0,
-            30.0,
-            LEAK,
-            Truth::Closed,
-        ),
+        case("a head in front of another", 12.0, 30.0, LEAK, Truth::Closed),
+        case("heads side by side, one farther away", 20.0, 30.0, LEAK, Truth::Closed),
         case("heads that touch", 20.0, 0.0, GRADIENT, Truth::Whole).known(touch),
     ]
 }
@@ -105,12 +93,7 @@ fn heads(quick: bool) -> Vec<Case> {
 /// A cylinder at 27 degrees in the picture, lit at `degrees` from the camera's direction.
 fn cylinder(rho_mm: f64, degrees: f64) -> Scene {
     let across = direction(27.0);
-    let form = Form::Cylinder {
-        along: DVec3::Z.cross(across),
-        rho_mm,
-        length_mm: 32.0,
-        turned: 0.0,
-    };
+    let form = Form::Cylinder { along: DVec3::Z.cross(across), rho_mm, length_mm: 32.0, turned: 0.0 };
     Scene(vec![Surface::lit(form, from_camera(degrees, across))])
 }
 
@@ -137,12 +120,7 @@ fn silhouettes(quick: bool) -> Vec<Case> {
     let thin = [known(EXACT, 0.033, why), known(PLAN, 0.043, why)];
     let finger = |light| case("a finger", 8.0, [160, 64], [96, 72], light);
     let rim = |light| case("the rim of an ear", 0.75, [40, 160], [32, 24], light).known(thin);
-    vec![
-        finger(0.0),
-        finger(4.0).pictured(false),
-        rim(0.0),
-        rim(4.0).pictured(false),
-    ]
+    vec![finger(0.0), finger(4.0).pictured(false), rim(0.0), rim(4.0).pictured(false)]
 }
 
 /// The border of the frame, which cuts the kernel.
@@ -152,17 +130,12 @@ fn border(quick: bool) -> Vec<Case> {
             let view = View::orthographic([128; 2], 4.0);
             // What lies within 8 mm of the right border, around its middle.
             let height = if quick { 20 } else { 96 };
-            let crop = Crop {
-                first: [96, (128 - height) / 2],
-                size: [32, height],
-            };
+            let crop = Crop { first: [96, (128 - height) / 2], size: [32, height] };
             let scene = Scene(vec![surface().moved(DVec3::X * 16.0)]);
             let trial = Trial::new(scene, view, crop, truth);
             match truth {
                 // Where a silhouette hides nothing that matters.
-                Truth::Closed => trial
-                    .only_where(|hit| hit.normal.z > 0.5)
-                    .atlas(texels, truth),
+                Truth::Closed => trial.only_where(|hit| hit.normal.z > 0.5).atlas(texels, truth),
                 _ => trial,
             }
         };
@@ -184,8 +157,7 @@ fn border(quick: bool) -> Vec<Case> {
     let seen = |name, surface, at_most| {
         let why = "Beyond the frame the pyramid repeats the light at its border. Draw a frame \
             that is 8 mm wider on all sides, or use the exact sum.";
-        case(name, "what is seen", Truth::Visible, [1; 2], surface)
-            .known([known(PLAN, at_most, why)])
+        case(name, "what is seen", Truth::Visible, [1; 2], surface).known([known(PLAN, at_most, why)])
     };
     vec![
         whole("an edge at the border", [192; 2], edge, 0.24),
@@ -216,9 +188,7 @@ fn slopes(quick: bool) -> Vec<Case> {
         falls between them. Use the exact sum, or light that is soft by 2 px.";
     let case = |(tilt, axis, [at_4, at_all]): (f64, f64, [f64; 2])| {
         let scales: &[f64] = if quick { &[4.0] } else { &[4.0, 2.0, 8.0] };
-        let frames = scales
-            .iter()
-            .flat_map(|s| [0.0, 45.0, 90.0].map(|edge| (*s, edge)));
+        let frames = scales.iter().flat_map(|s| [0.0, 45.0, 90.0].map(|edge| (*s, edge)));
         let diagonal = if axis > 0.0 { ", diagonal" } else { "" };
         let name = format!("slope of {tilt} degrees{diagonal}");
         let case = Case::new(name, what, PROMISE, move |lab| {
@@ -250,9 +220,7 @@ fn slope([tilt, axis, edge]: [f64; 3], px_per_mm: f64) -> Trial {
     let crop = Crop::middle(&view, crop_px.ceil().as_uvec2().into());
     Trial::new(Scene(vec![surface]), view, crop, Truth::Closed).only_where(move |hit| {
         let from_middle = hit.point + DVec3::Z * 300.0;
-        [along, down]
-            .iter()
-            .all(|side| from_middle.dot(*side).abs() < NEAR_MM)
+        [along, down].iter().all(|side| from_middle.dot(*side).abs() < NEAR_MM)
     })
 }
 
@@ -271,8 +239,7 @@ fn behind(quick: bool) -> Vec<Case> {
             let near = Surface::solved(face(), |_, _| DVec3::ZERO, move |_, _| through);
             let far = Surface::even(face(), 1.0).moved(DVec3::NEG_Z * thickness_mm);
             let crop = Crop::middle(&view, [16; 2]);
-            Trial::new(Scene(vec![near, far]), view, crop, Truth::Closed)
-                .atlas([64; 2], Truth::Closed)
+            Trial::new(Scene(vec![near, far]), view, crop, Truth::Closed).atlas([64; 2], Truth::Closed)
         };
         let what = "Two faces this far apart, the hidden one lit by 1 and the visible one not, 4 \
             px/mm: difference to what Eq. 7 as printed passes. In texture space each face has an \
@@ -282,52 +249,26 @@ fn behind(quick: bool) -> Vec<Case> {
             transmission by thickness.";
         let at_most = through.max_element() * 1.01;
         let name = format!("an ear {thickness_mm} mm thick, lit from behind");
-        trial(name, what, GRADIENT, make)
-            .known(unseen([at_most; 2]))
-            .known([known(ATLAS, at_most, why)])
+        trial(name, what, GRADIENT, make).known(unseen([at_most; 2])).known([known(ATLAS, at_most, why)])
     };
     let case = |part: &str, degrees: f64, size: u32, crop, texels, scene: fn(f64) -> Scene| {
         let make = move || {
             let view = View::orthographic([size; 2], 4.0);
-            Trial::new(
-                scene(degrees),
-                view,
-                Crop::middle(&view, crop),
-                Truth::Closed,
-            )
-            .only_where(move |hit| degrees > 90.0 || hit.normal.z > 0.5)
-            .atlas(texels, Truth::Closed)
+            Trial::new(scene(degrees), view, Crop::middle(&view, crop), Truth::Closed)
+                .only_where(move |hit| degrees > 90.0 || hit.normal.z > 0.5)
+                .atlas(texels, Truth::Closed)
         };
         let what = "A cylinder of 8 mm radius (the rim of an ear: 0.75 mm) or a ball of 10 mm, \
             lit at 90 degrees from the camera's direction (from the side) or 130 (from behind; \
             the rim: 150), 4 px/mm: largest difference to the closed form, from the side where \
             it is turned by less than 60 degrees from the camera, from behind without its rim.";
-        let from = if degrees > 90.0 {
-            "from behind"
-        } else {
-            "from the side"
-        };
+        let from = if degrees > 90.0 { "from behind" } else { "from the side" };
         trial(format!("{part} lit {from}"), what, GRADIENT, make)
     };
-    let rim = case("the rim of an ear", 150.0, 128, [31, 16], [40, 160], |d| {
-        cylinder(0.75, d)
-    });
-    let finger = |d| {
-        case("a finger", d, 128, [104, 40], [160, 64], |d| {
-            cylinder(8.0, d)
-        })
-    };
+    let rim = case("the rim of an ear", 150.0, 128, [31, 16], [40, 160], |d| cylinder(0.75, d));
+    let finger = |d| case("a finger", d, 128, [104, 40], [160, 64], |d| cylinder(8.0, d));
     let lit = |d| Scene(vec![Surface::lit(ball(), from_camera(d, direction(27.0)))]);
-    let head = |d| {
-        case(
-            "a head",
-            d,
-            96,
-            [88, if quick { 44 } else { 88 }],
-            [160; 2],
-            lit,
-        )
-    };
+    let head = |d| case("a head", d, 96, [88, if quick { 44 } else { 88 }], [160; 2], lit);
     vec![
         slab(1.5),
         slab(4.0).pictured(false),
@@ -347,11 +288,7 @@ fn scales(quick: bool) -> Vec<Case> {
         let side = if quick { 128 } else { 256 };
         // Where the middle of the frame sees all that scatters to it, there is a closed form.
         let is_cut = f64::from(side) / px_per_mm / 2.0 < REACH_MM + 12.0 / px_per_mm;
-        let truth = if is_cut {
-            Truth::Visible
-        } else {
-            Truth::Closed
-        };
+        let truth = if is_cut { Truth::Visible } else { Truth::Closed };
         let make = move || {
             let view = View::orthographic([side; 2], px_per_mm);
             let form = Form::facing(f64::from(side) / px_per_mm);
@@ -386,9 +323,7 @@ fn scales(quick: bool) -> Vec<Case> {
         kernel(10.0),
         kernel(50.0).pictured(false),
         kernel(200.0),
-        small("a line of light 0.1 mm wide", 2.0, |p| {
-            p.dot(direction(100.0)).abs() < 0.05
-        }),
+        small("a line of light 0.1 mm wide", 2.0, |p| p.dot(direction(100.0)).abs() < 0.05),
         small("freckles of 1 mm", 0.3, |p| {
             let at = DVec2::from_angle(0.3).rotate(p.truncate()) / 5.3;
             5.3 * (at - at.floor() - 0.5).length() > 0.5

@@ -36,17 +36,9 @@ pub fn run(lab: &Lab, uvs: &[Uvs]) -> Result<Outcome, Error> {
     let (truth, skin) = scatter(lab, INSIDE)?;
     let mut outcome = Outcome::default();
     // Each is held to its own, so that a picture has room for one; the middle half is enough to see.
-    let crop = Crop {
-        first: [0, PIXELS[1] / 4],
-        size: [PIXELS[0], PIXELS[1] / 2],
-    };
+    let crop = Crop { first: [0, PIXELS[1] / 4], size: [PIXELS[0], PIXELS[1] / 2] };
     let own = truth.iter().find(|(name, _)| *name == ATLAS);
-    let own = own.map(|(_, r)| {
-        r.iter()
-            .map(|v| v.as_dvec3())
-            .enumerate()
-            .collect::<Vec<_>>()
-    });
+    let own = own.map(|(_, r)| r.iter().map(|v| v.as_dvec3()).enumerate().collect::<Vec<_>>());
     for uv in uvs {
         let (mut results, _) = scatter(lab, *uv)?;
         merge(&mut outcome.figures, apart(&results, &truth, &skin));
@@ -73,11 +65,7 @@ fn scatter(lab: &Lab, uv: Uvs) -> Result<(Results, Vec<usize>), Error> {
         fov_y: 2.0 * (0.52 * SIDE_MM / distance).atan(),
     };
     let lighting = Lighting {
-        lights: vec![Light {
-            direction: Vec3::new(-0.8, 0.4, 0.5),
-            radius_degrees: 4.0,
-            color: Vec3::ONE,
-        }],
+        lights: vec![Light { direction: Vec3::new(-0.8, 0.4, 0.5), radius_degrees: 4.0, color: Vec3::ONE }],
         ..Default::default()
     };
     renderer.render(gpu, &camera, &lighting, MM_PER_UNIT)?;
@@ -93,14 +81,8 @@ fn scatter(lab: &Lab, uv: Uvs) -> Result<(Results, Vec<usize>), Error> {
         results.push((name, lab.read(&output)));
         Ok(())
     })?;
-    let ids = gpu
-        .read_bytes(buffers.profile_id.texture())
-        .into_iter()
-        .enumerate();
-    Ok((
-        results,
-        ids.filter(|(_, id)| *id == 1).map(|(i, _)| i).collect(),
-    ))
+    let ids = gpu.read_bytes(buffers.profile_id.texture()).into_iter().enumerate();
+    Ok((results, ids.filter(|(_, id)| *id == 1).map(|(i, _)| i).collect()))
 }
 
 /// The sheet as a binary glTF file, in metres.
@@ -121,9 +103,7 @@ fn sheet(uv: Uvs) -> Vec<u8> {
         let above = first + GRID + 1;
         [first, first + 1, above + 1, first, above + 1, above]
     };
-    let indices: Vec<u32> = (0..GRID)
-        .flat_map(|y| (0..GRID).flat_map(move |x| square(x, y)))
-        .collect();
+    let indices: Vec<u32> = (0..GRID).flat_map(|y| (0..GRID).flat_map(move |x| square(x, y))).collect();
     let views = [
         bytemuck::cast_slice::<_, u8>(&positions),
         bytemuck::cast_slice(&uvs),

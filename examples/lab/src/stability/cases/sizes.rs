@@ -42,29 +42,15 @@ const SIZES: [[u32; 2]; 12] = [
 
 /// All views and widths; `short` has two sizes of two views.
 pub fn sweeps(short: bool) -> Vec<Sweep> {
-    let sweep = |widening, view, sizes| Sweep {
-        widening,
-        view,
-        sizes,
-    };
+    let sweep = |widening, view, sizes| Sweep { widening, view, sizes };
     if short {
         return [View::Front, View::ThreeQuarter]
             .map(|view| sweep(1.0, view, &[[389, 517], [768, 768]]))
             .into();
     }
-    let views = [
-        View::Front,
-        View::ThreeQuarter,
-        View::Profile,
-        View::CloseUp,
-    ];
-    let of = |view| {
-        [
-            sweep(1.0, view, &SIZES),
-            sweep(0.4, view, &SIZES[6..]),
-            sweep(2.5, view, &SIZES[6..]),
-        ]
-    };
+    let views = [View::Front, View::ThreeQuarter, View::Profile, View::CloseUp];
+    let of =
+        |view| [sweep(1.0, view, &SIZES), sweep(0.4, view, &SIZES[6..]), sweep(2.5, view, &SIZES[6..])];
     views.into_iter().flat_map(of).collect()
 }
 
@@ -75,10 +61,8 @@ impl Sweep {
     /// No plan for the profile, or a frame that the device cannot hold.
     pub fn worst(&self, gpu: &Gpu) -> Result<f64, Error> {
         let scene = Scene::from_glb(crate::HEAD)?;
-        let wider = |g: &Gaussian| Gaussian {
-            variance_mm2: g.variance_mm2 * self.widening * self.widening,
-            ..*g
-        };
+        let wider =
+            |g: &Gaussian| Gaussian { variance_mm2: g.variance_mm2 * self.widening * self.widening, ..*g };
         let gaussians: Vec<_> = Profile::SKIN.gaussians().iter().map(wider).collect();
         let profiles = [Profile::new(&gaussians)?];
         let exact = Plan::exact(&profiles)?;
@@ -123,8 +107,7 @@ pub(super) fn cases(quick: bool) -> Vec<Case> {
     let case = |sweep: Sweep| {
         let name = format!("{:?}, {} times as wide", sweep.view, sweep.widening);
         let run = move |lab: &Lab| Ok(vec![(PLAN, sweep.worst(&lab.gpu)?)].into());
-        let known =
-            (sweep.view == View::Front && sweep.widening == 1.0).then(|| known(PLAN, 0.34, why));
+        let known = (sweep.view == View::Front && sweep.widening == 1.0).then(|| known(PLAN, 0.34, why));
         Case::new(name, what, bound, run).known(known)
     };
     sweeps.into_iter().map(case).collect()

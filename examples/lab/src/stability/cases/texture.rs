@@ -55,18 +55,14 @@ fn squares(quick: bool) -> Vec<Case> {
     let fine = [DVec2::X, DVec2::Y].map(|axis| axis / 20.0);
     let case = |name: &str, what: &str, square: &Square, layout: Layout| {
         let square = square.clone();
-        Case::new(name, what, GRADIENT, move |lab| {
-            square.run(lab, &layout, worst)
-        })
+        Case::new(name, what, GRADIENT, move |lab| square.run(lab, &layout, worst))
     };
     let rms = |name: &str, layout: Layout| {
         let what = "The edge at 27 degrees, the square in one piece, or cut into 10x10 islands \
             of 2.8 mm that lie shuffled in the atlas. Here the figure is the root mean square of \
             the differences over that of the truth.";
         let square = diagonal.clone();
-        Case::new(name, what, GRADIENT, move |lab| {
-            square.run(lab, &layout, relative_rms)
-        })
+        Case::new(name, what, GRADIENT, move |lab| square.run(lab, &layout, relative_rms))
     };
     let seam = |at_most| [known(ATLAS, at_most, SEAM)];
     let seams = "A flat square under a soft edge of light (σ of 0.5 mm), cut into two islands \
@@ -92,40 +88,14 @@ fn squares(quick: bool) -> Vec<Case> {
     vec![
         case("a seam along an edge of light", seams, &upright, halves()).known(seam(0.26)),
         case("a seam across an edge of light", seams, &diagonal, halves()).known(seam(0.22)),
-        case(
-            "stretch 1:2",
-            stretch,
-            &wide,
-            whole(0.4 * DVec2::X, 0.2 * DVec2::Y),
-        ),
-        case(
-            "stretch 1:8",
-            stretch,
-            &wide,
-            whole(0.4 * DVec2::X, 0.05 * DVec2::Y),
-        ),
+        case("stretch 1:2", stretch, &wide, whole(0.4 * DVec2::X, 0.2 * DVec2::Y)),
+        case("stretch 1:8", stretch, &wide, whole(0.4 * DVec2::X, 0.05 * DVec2::Y)),
         case("shear by 60 degrees", shear, &diagonal, whole(u, sheared)),
-        case(
-            "a mirrored island",
-            behind,
-            &diagonal,
-            Layout::apart(2, mirrored),
-        )
-        .pictured(false),
-        case(
-            "islands that overlap",
-            drawn_over,
-            &diagonal,
-            whole(u, v).drawn_over(right_half),
-        )
-        .known([by_nature(ATLAS, 1.05, overlap)]),
-        case(
-            "one texel a mm",
-            wide_texels,
-            &diagonal,
-            whole(DVec2::X, DVec2::Y),
-        )
-        .known([by_nature(ATLAS, 0.1, coarse)]),
+        case("a mirrored island", behind, &diagonal, Layout::apart(2, mirrored)).pictured(false),
+        case("islands that overlap", drawn_over, &diagonal, whole(u, v).drawn_over(right_half))
+            .known([by_nature(ATLAS, 1.05, overlap)]),
+        case("one texel a mm", wide_texels, &diagonal, whole(DVec2::X, DVec2::Y))
+            .known([by_nature(ATLAS, 0.1, coarse)]),
         case("twenty texels a mm", narrow, &upright, strip).pictured(false),
         rms("one island", whole(u, v)).pictured(false),
         rms("a hundred islands", hundred).known(seam(0.06)),
@@ -170,8 +140,7 @@ fn sheets() -> [Case; 2] {
         |at| 3.0 * sheet::INSIDE(at),
     ];
     // Left and right halves on the same texels, as a face that is painted once.
-    const MIRRORED: [sheet::Uvs; 1] =
-        [|at| sheet::INSIDE(Vec2::new((2.0 * at.x - 1.0).abs(), at.y))];
+    const MIRRORED: [sheet::Uvs; 1] = [|at| sheet::INSIDE(Vec2::new((2.0 * at.x - 1.0).abs(), at.y))];
     let why = "Each half has a page of its own, and where they meet is a seam. Give each half \
         UVs of its own, or use the exact sum.";
     [
@@ -226,9 +195,7 @@ fn many_heads() -> Case {
 fn head(head: u32) -> Surface {
     let [column, row] = [head % 3, head / 3].map(f64::from);
     let behind_mm = -40.0 * f64::from((head % 3 + 2 * (head / 3)) % 4);
-    let light = DVec2::from_angle(f64::from(head) * 2.4)
-        .extend(1.0)
-        .normalize();
+    let light = DVec2::from_angle(f64::from(head) * 2.4).extend(1.0).normalize();
     let place = DVec3::new(17.5 * (column - 1.0), 17.5 * (row - 1.0), behind_mm);
     Surface::lit(Form::Sphere { rho_mm: 8.0 }, light).moved(place)
 }
@@ -261,8 +228,7 @@ fn heads_in_atlases(lab: &Lab) -> Result<Figures, Error> {
     let heads: Vec<Unwrapped> = (0..9).map(unwrap).collect();
     let mut figures = Vec::new();
     lab.by_atlas(|name, method| {
-        let [alone, together] =
-            [(); 2].map(|()| heads.iter().map(|h| h.upload(gpu)).collect::<Vec<_>>());
+        let [alone, together] = [(); 2].map(|()| heads.iter().map(|h| h.upload(gpu)).collect::<Vec<_>>());
         for head in &alone {
             method::scatter_atlas(gpu, method, &head.atlas(), &head.output)?;
         }

@@ -44,9 +44,7 @@ pub fn cases(quick: bool) -> Vec<Case> {
 fn pan(quick: bool) -> Vec<DAffine3> {
     let (count, step_px) = if quick { (17, 0.625) } else { (81, 0.125) };
     let moved = |i: u32| DVec3::new(1.0, 0.6, 0.0) * (step_px * f64::from(i) / PX_PER_MM);
-    (0..count)
-        .map(|i| DAffine3::from_translation(-moved(i)))
-        .collect()
+    (0..count).map(|i| DAffine3::from_translation(-moved(i))).collect()
 }
 
 /// A plane under waves of all directions.
@@ -58,48 +56,34 @@ fn over_a_plane(tilt: f64, quick: bool) -> Case {
     let why = "Taps of the pyramid lie on lattices of whole pixels, each slope has one of its \
         own, and a simple tile one for all its pixels: a point changes from one to another as \
         tiles pass over it. Use the exact sum.";
-    let case = Case::new(
-        format!("pan over a plane at {tilt}°"),
-        what,
-        FLICKER,
-        move |lab| {
-            let fov_degrees = 20f64;
-            let distance_mm = 64.0 / (fov_degrees / 2.0).to_radians().tan() / PX_PER_MM;
-            // Radians a mm, direction, share: 2.6 is 8 px where the plane is farthest.
-            let waves = [
-                (2.6, 0.0, 0.12),
-                (2.0, 80.0, 0.12),
-                (1.6, 140.0, 0.12),
-                (0.6, 35.0, 0.14),
-            ];
-            let normal = tilted_normal(tilt, 15.0);
-            let along = DVec3::X.reject_from_normalized(normal).normalize();
-            let down = along.cross(normal);
-            let light = move |point: DVec3, passed: fn(f64) -> DVec3| {
-                let place = DVec3::new(point.dot(along), -point.dot(down), 0.0);
-                let wave = |(rad_per_mm, degrees, share): (f64, f64, f64)| {
-                    let phase = rad_per_mm * direction(degrees).dot(place);
-                    share * phase.sin() * passed(rad_per_mm)
-                };
-                DVec3::splat(0.5) + waves.into_iter().map(wave).sum::<DVec3>()
+    let case = Case::new(format!("pan over a plane at {tilt}°"), what, FLICKER, move |lab| {
+        let fov_degrees = 20f64;
+        let distance_mm = 64.0 / (fov_degrees / 2.0).to_radians().tan() / PX_PER_MM;
+        // Radians a mm, direction, share: 2.6 is 8 px where the plane is farthest.
+        let waves = [(2.6, 0.0, 0.12), (2.0, 80.0, 0.12), (1.6, 140.0, 0.12), (0.6, 35.0, 0.14)];
+        let normal = tilted_normal(tilt, 15.0);
+        let along = DVec3::X.reject_from_normalized(normal).normalize();
+        let down = along.cross(normal);
+        let light = move |point: DVec3, passed: fn(f64) -> DVec3| {
+            let place = DVec3::new(point.dot(along), -point.dot(down), 0.0);
+            let wave = |(rad_per_mm, degrees, share): (f64, f64, f64)| {
+                let phase = rad_per_mm * direction(degrees).dot(place);
+                share * phase.sin() * passed(rad_per_mm)
             };
-            let form = Form::Plane {
-                along,
-                down,
-                size_mm: DVec2::splat(28.0),
-            };
-            let all = move |point, _| light(point, |_| DVec3::ONE);
-            let scattered = move |point, _| light(point, |k| passed_wave(k, &Profile::SKIN));
-            let moved = DVec3::Z * (300.0 - distance_mm);
-            let points = grid(3.0).map(|at| MIDDLE + moved + at.x * along - at.y * down);
-            let followed = Followed {
-                scene: Scene(vec![Surface::solved(form, all, scattered).moved(moved)]),
-                texels: [224; 2],
-                points: points.collect(),
-            };
-            followed.swing(lab, View::perspective([128; 2], fov_degrees), &pan(quick))
-        },
-    );
+            DVec3::splat(0.5) + waves.into_iter().map(wave).sum::<DVec3>()
+        };
+        let form = Form::Plane { along, down, size_mm: DVec2::splat(28.0) };
+        let all = move |point, _| light(point, |_| DVec3::ONE);
+        let scattered = move |point, _| light(point, |k| passed_wave(k, &Profile::SKIN));
+        let moved = DVec3::Z * (300.0 - distance_mm);
+        let points = grid(3.0).map(|at| MIDDLE + moved + at.x * along - at.y * down);
+        let followed = Followed {
+            scene: Scene(vec![Surface::solved(form, all, scattered).moved(moved)]),
+            texels: [224; 2],
+            points: points.collect(),
+        };
+        followed.swing(lab, View::perspective([128; 2], fov_degrees), &pan(quick))
+    });
     case.known((tilt > 0.0).then(|| known(PLAN, 0.0095, why)))
 }
 
@@ -113,28 +97,21 @@ fn over_a_sphere(quick: bool) -> Case {
     Case::new("pan over a sphere", what, FLICKER, move |lab| {
         let rho_mm = 10.0;
         let sun = DVec3::new(-0.9, 0.3, 0.45).normalize();
-        let poles =
-            [DVec3::new(0.2, 0.1, 0.97), DVec3::new(-0.3, -0.2, 0.93)].map(DVec3::normalize);
+        let poles = [DVec3::new(0.2, 0.1, 0.97), DVec3::new(-0.3, -0.2, 0.93)].map(DVec3::normalize);
         let rings = move |normal: DVec3| -> f64 {
             let at = |pole: &DVec3| legendre(normal.dot(*pole)).nth(RINGS).unwrap_or(0.0);
             poles.iter().map(at).sum()
         };
-        let light =
-            move |_, n: DVec3| DVec3::splat(0.6 * n.dot(sun).max(0.0) + 0.2 + 0.1 * rings(n));
+        let light = move |_, n: DVec3| DVec3::splat(0.6 * n.dot(sun).max(0.0) + 0.2 + 0.1 * rings(n));
         let scattered_sun = scattered_cosine(rho_mm, &Profile::SKIN);
         let passed = passed_harmonics(rho_mm, RINGS + 1, &Profile::SKIN)[RINGS];
-        let scattered =
-            move |_, n: DVec3| 0.6 * scattered_sun(n.dot(sun)) + 0.2 + 0.1 * passed * rings(n);
+        let scattered = move |_, n: DVec3| 0.6 * scattered_sun(n.dot(sun)) + 0.2 + 0.1 * passed * rings(n);
         let on_sphere = |place: DVec2| {
             let depth = (rho_mm * rho_mm - place.length_squared()).sqrt();
             MIDDLE + place.extend(depth)
         };
         let followed = Followed {
-            scene: Scene(vec![Surface::solved(
-                Form::Sphere { rho_mm },
-                light,
-                scattered,
-            )]),
+            scene: Scene(vec![Surface::solved(Form::Sphere { rho_mm }, light, scattered)]),
             texels: [304; 2],
             points: grid(5.5).map(on_sphere).collect(),
         };
@@ -156,15 +133,9 @@ fn past_a_layer(quick: bool) -> Case {
         let from_edge = |point: DVec3| point.truncate().dot(across) + 2.6;
         let near = plane(DVec3::Z, 295.0, |_| DVec3::ZERO);
         let far = plane(DVec3::Z, 300.0, |_| DVec3::ONE);
-        let point = |y_mm, i| {
-            across
-                .rotate(DVec2::new(0.75 + 0.16 * i as f64 - 2.6, y_mm))
-                .extend(-300.0)
-        };
+        let point = |y_mm, i| across.rotate(DVec2::new(0.75 + 0.16 * i as f64 - 2.6, y_mm)).extend(-300.0);
         let rows = [-0.7, 0.9].into_iter();
-        let points: Vec<DVec3> = rows
-            .flat_map(|y| (0..COLUMNS).map(move |i| point(y, i)))
-            .collect();
+        let points: Vec<DVec3> = rows.flat_map(|y| (0..COLUMNS).map(move |i| point(y, i))).collect();
         let view = View::orthographic([128; 2], PX_PER_MM);
         let mut track = Track::default();
         for (number, to_view) in (0..).zip(pan(quick)) {
@@ -181,8 +152,7 @@ fn past_a_layer(quick: bool) -> Case {
             let taps = taps(&g, points.iter().map(|p| *p + moved));
             let asked: Vec<usize> = taps.iter().map(|t| t.pixel).collect();
             let truths = g.visible_integral(&asked, &Profile::SKIN);
-            let results =
-                results.map(|(m, r)| (m, errors(&taps, &truths, asked.iter().map(|i| r[*i]))));
+            let results = results.map(|(m, r)| (m, errors(&taps, &truths, asked.iter().map(|i| r[*i]))));
             track.push(number, read(&taps, truths.iter().copied()), results);
         }
         Ok(track.outcome(Track::swing, 0..COLUMNS))
@@ -220,19 +190,15 @@ fn roll(quick: bool) -> Case {
         pixel falls between texels. Use a finer atlas, or a cubic fetch.";
     Case::new("camera rolls over a spot", what, FLICKER, move |lab| {
         let (spot, spot_mm2) = (DVec3::new(0.13, 0.21, 0.0), (2.0 / PX_PER_MM).powi(2));
-        let light =
-            move |p: DVec3, _| DVec3::splat((-p.distance_squared(spot) / (2.0 * spot_mm2)).exp());
-        let scattered =
-            move |p: DVec3, _| scattered_spot(p.distance(spot), spot_mm2, &Profile::SKIN);
+        let light = move |p: DVec3, _| DVec3::splat((-p.distance_squared(spot) / (2.0 * spot_mm2)).exp());
+        let scattered = move |p: DVec3, _| scattered_spot(p.distance(spot), spot_mm2, &Profile::SKIN);
         let turns = if quick { 15 } else { 90 };
         let turned = |i| DAffine3::from_rotation_z(FRAC_PI_2 * f64::from(i) / f64::from(turns));
         let cameras: Vec<DAffine3> = (0..=turns).map(turned).collect();
         let followed = Followed {
             scene: Scene(vec![Surface::solved(Form::facing(32.0), light, scattered)]),
             texels: [256; 2],
-            points: grid(3.0)
-                .map(|place| MIDDLE + spot + place.extend(0.0))
-                .collect(),
+            points: grid(3.0).map(|place| MIDDLE + spot + place.extend(0.0)).collect(),
         };
         followed.swing(lab, View::orthographic([128; 2], PX_PER_MM), &cameras)
     })
@@ -263,26 +229,14 @@ fn zoom(quick: bool) -> Case {
         form, changes by from one frame to the next. The atlas has 12.8 texels/mm. Frames have 8 \
         rows; `burley_disk`, which needs as many rows as columns, is left out.";
     Case::new("zoom by 100 times", what, FLICKER, move |lab| {
-        let frames = if quick {
-            around_switches(&lab.plan)
-        } else {
-            (0..=ZOOM).collect()
-        };
+        let frames = if quick { around_switches(&lab.plan) } else { (0..=ZOOM).collect() };
         let places: Vec<f64> = (-40..=40).map(|i| 0.1 * f64::from(i)).collect();
         let mut track = Track::default();
         for frame in frames {
             let px_per_mm = 0.3 * f64::powf(100.0, f64::from(frame) / f64::from(ZOOM));
-            let form = Form::Plane {
-                along: DVec3::X,
-                down: DVec3::NEG_Y,
-                size_mm: DVec2::new(40.0, 0.625),
-            };
-            let scene = Scene(vec![Surface::edge(
-                form,
-                DVec3::X,
-                0.0,
-                (2.0 / px_per_mm).powi(2),
-            )]);
+            let form =
+                Form::Plane { along: DVec3::X, down: DVec3::NEG_Y, size_mm: DVec2::new(40.0, 0.625) };
+            let scene = Scene(vec![Surface::edge(form, DVec3::X, 0.0, (2.0 / px_per_mm).powi(2))]);
             let g = scene.shoot(&View::orthographic([832, 8], px_per_mm));
             let points = places.iter().map(|x| MIDDLE + DVec3::X * *x);
             let taps = taps(&g, points.clone());
@@ -295,19 +249,9 @@ fn zoom(quick: bool) -> Case {
             }
             // All rows of the atlas are the same.
             let uvs = taps.iter().map(|t| DVec2::new(scene.uv(0, t.point).x, 0.5));
-            results.extend(
-                scene
-                    .unwrap([512, 8])
-                    .scatter(lab, &uvs.collect::<Vec<_>>())?,
-            );
-            let results = results
-                .into_iter()
-                .map(|(m, r)| (m, errors(&taps, &truths, r)));
-            track.push(
-                frame,
-                points.map(|p| scene.scattered(0, p)).collect(),
-                results,
-            );
+            results.extend(scene.unwrap([512, 8]).scatter(lab, &uvs.collect::<Vec<_>>())?);
+            let results = results.into_iter().map(|(m, r)| (m, errors(&taps, &truths, r)));
+            track.push(frame, points.map(|p| scene.scattered(0, p)).collect(), results);
         }
         Ok(track.outcome(Track::step, 0..places.len()))
     })
@@ -328,10 +272,7 @@ fn still(lab: &Lab, surface: Surface, size: u32, side: u32, texels: u32) -> Resu
     let g = scene.shoot(&view);
     let pixels = Crop::middle(&view, [side; 2]).pixels(size).into_iter();
     let pixels: Vec<(usize, Hit)> = pixels.filter_map(|i| g.hits[i].map(|h| (i, h))).collect();
-    let truth: Vec<DVec3> = pixels
-        .iter()
-        .map(|(_, h)| scene.scattered(0, h.point))
-        .collect();
+    let truth: Vec<DVec3> = pixels.iter().map(|(_, h)| scene.scattered(0, h.point)).collect();
     let inputs = Texels::of(&g, 0.0).upload(&lab.gpu);
     let mut results = lab.scatter(&inputs.frame(), &inputs.output)?;
     for (_, r) in &mut results {
@@ -339,12 +280,7 @@ fn still(lab: &Lab, surface: Surface, size: u32, side: u32, texels: u32) -> Resu
     }
     let uvs: Vec<DVec2> = pixels.iter().map(|(_, h)| scene.uv(0, h.point)).collect();
     results.extend(scene.unwrap([texels; 2]).scatter(lab, &uvs)?);
-    let off = |r: Vec<Vec3>| {
-        r.iter()
-            .zip(&truth)
-            .map(|(r, t)| r.as_dvec3() - t)
-            .collect()
-    };
+    let off = |r: Vec<Vec3>| r.iter().zip(&truth).map(|(r, t)| r.as_dvec3() - t).collect();
     let errors = results.into_iter().map(|(m, r)| (m, off(r))).collect();
     Ok((truth, errors))
 }
@@ -369,11 +305,7 @@ fn of_track<const N: usize>(
     cases.map(|(name, bound, figures)| {
         let (make, track) = (make.clone(), track.clone());
         let first = width / 2 * width;
-        let run = move |lab: &Lab| {
-            Ok(track
-                .get(|| make(lab))?
-                .outcome(figures, first..first + width))
-        };
+        let run = move |lab: &Lab| Ok(track.get(|| make(lab))?.outcome(figures, first..first + width));
         Case::new(name, what, bound, run)
     })
 }
@@ -396,10 +328,8 @@ fn turning_light(quick: bool) -> [Case; 2] {
         the largest of all frames.";
     let why = "By less than 0.0005, in the full form alone: the pyramid's own blur does not know \
         that the ball is bent, and its taps make up for that in part. The exact sum passes.";
-    let cases: [(_, _, Figure); 2] = [
-        ("light turns: step", FLICKER, Track::step),
-        ("light turns: error", GRADIENT, Track::worst),
-    ];
+    let cases: [(_, _, Figure); 2] =
+        [("light turns: step", FLICKER, Track::step), ("light turns: error", GRADIENT, Track::worst)];
     let [step, error] = of_track(make, 48, what, cases);
     [step, error.known([known(PLAN, 0.0115, why)])]
 }
@@ -418,15 +348,10 @@ fn off_and_on() -> Case {
         let (_, black) = still(lab, Surface::even(BALL, 0.0), 88, 48, 160)?;
         let (_, again) = lit_ball(lab, sun)?;
         let mut figures = vec![];
-        for ((method, lit), ((_, black), (_, again))) in
-            lit.into_iter().zip(black.iter().zip(&again))
-        {
+        for ((method, lit), ((_, black), (_, again))) in lit.into_iter().zip(black.iter().zip(&again)) {
             let changes = lit.iter().zip(again).map(|(a, b)| *b - *a);
             let all = changes.chain(black.iter().copied());
-            merge(
-                &mut figures,
-                [(method, largest(all.flat_map(|c| c.abs().to_array())))],
-            );
+            merge(&mut figures, [(method, largest(all.flat_map(|c| c.abs().to_array())))]);
         }
         Ok(figures.into())
     })
@@ -456,10 +381,7 @@ fn moving_shadow(quick: bool) -> [Case; 3] {
         why: "half floats have steps of 0.0005 below white, so that a result may fall by one \
               where it hardly moves.",
     };
-    let error = Bound {
-        degrades: FOUND,
-        ..super::PROMISE
-    };
+    let error = Bound { degrades: FOUND, ..super::PROMISE };
     let cases: [(_, _, Figure); 3] = [
         ("shadow moves: error", error, Track::worst),
         ("shadow moves: swing", FLICKER, Track::swing),
