@@ -73,7 +73,7 @@ fn only_a_plan_can_be_shown() {
     let gpu = gpu();
     let overlay = Overlay::new(&gpu.device, TextureFormat::Rgba8Unorm).unwrap();
     let target = gpu.target("picture", SIZE, TextureFormat::Rgba8Unorm);
-    let mut render = |view: &subsurface::View| {
+    let render = |view: &subsurface::View| {
         gpu.run(|encoder| overlay.render(&gpu.device, encoder, view, Show::Class, &target))
     };
     let mut view = subsurface::View::new();

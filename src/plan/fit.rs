@@ -26,14 +26,21 @@ const BETWEEN: [f64; 3] = [0.25, 0.5, 0.75];
 /// Weights are multiples of 1/`STEPS`, so that they are written and read without loss.
 pub(super) const STEPS: f64 = 1e5;
 
-/// The weights of these blurs whose error is the least, without blurs that `max_error` does not ask for.
-/// [`Weights::predicted_error`] may be above it. None where that is above `hopeless`, as soon as it is known.
-pub(super) fn fit(
-    profiles: &[Profile],
-    max_error: f32,
-    kernels: Kernels,
-    hopeless: f32,
-) -> Option<Weights> {
+/// Errors that a fit goes by, in units of white.
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    /// The largest that is asked for, up to which scales beyond the fitted ones are taken.
+    pub(super) max_error: f32,
+    /// Blurs that this error does not ask for are left out. 0: none.
+    pub(super) spare: f32,
+    /// There is no fit where the error is above this, as soon as that is known.
+    pub(super) hopeless: f32,
+}
+
+/// The weights of these blurs whose error is the least, but for blurs that are left out.
+/// [`Weights::predicted_error`] may be above `max_error`.
+pub(super) fn fit(profiles: &[Profile], kernels: Kernels, limits: Limits) -> Option<Weights> {
+    let Limits { max_error, spare, hopeless } = limits;
     let responses = Responses::new(&kernels, FITTED_LEVELS);
     let (first_octave, rows) = scales(profiles);
     let mut fitted: Vec<Vec<Mixture>> = Vec::new();
@@ -47,7 +54,7 @@ pub(super) fn fit(
                     kernels: &kernels,
                     profile,
                     first_octave,
-                    max_error: max_error.into(),
+                    spare: spare.into(),
                 };
                 fit.rows(rows, hopeless.into())?
             }
@@ -92,7 +99,8 @@ struct Fit<'a> {
     kernels: &'a Kernels,
     profile: &'a Profile,
     first_octave: f64,
-    max_error: f64,
+    /// See [`Limits`].
+    spare: f64,
 }
 
 impl Fit<'_> {
@@ -164,7 +172,7 @@ impl Fit<'_> {
         };
         if square.is_some() {
             // Between two rows the error is a little larger than at either.
-            let (fit, kept) = fit(square, 0.9 * self.max_error);
+            let (fit, kept) = fit(square, 0.9 * self.spare);
             if kept {
                 return fit;
             }
@@ -178,7 +186,7 @@ impl Fit<'_> {
         let columns = &self.responses.columns;
         let limits = CHANNELS.map(|c| {
             let error = largest_residual(columns, &fit[c].weights(), &targets[c]);
-            (error + SPECK * self.max_error).min(self.max_error.max(error))
+            (error + SPECK * self.spare).min(self.spare.max(error))
         });
         for j in (1..columns.len()).rev() {
             let mut without = fit.clone();
@@ -306,6 +314,11 @@ mod tests {
     use crate::Gaussian;
     use crate::plan::KERNELS;
 
+    /// Of a fit that is made whatever its error.
+    fn limits(max_error: f32) -> Limits {
+        Limits { max_error, spare: max_error, hopeless: f32::INFINITY }
+    }
+
     fn profiles() -> Vec<Profile> {
         let of = |terms: &[(f32, [f32; 3])]| {
             let gaussian = |(variance_mm2, weight): &(f32, [f32; 3])| Gaussian {
@@ -340,7 +353,7 @@ mod tests {
             let responses = Responses::new(&kernels, FITTED_LEVELS);
             for profile in profiles() {
                 let since = std::time::Instant::now();
-                let fit = fit(&[profile], 1.0 / 255.0, kernels, f32::INFINITY).unwrap();
+                let fit = fit(&[profile], kernels, limits(1.0 / 255.0)).unwrap();
                 println!("{:.6} predicted, {:?}", fit.predicted_error(), since.elapsed());
                 let fitted = scales(&[profile]).1;
                 for (i, pair) in fit.profiles[0][..fitted].windows(2).enumerate() {
@@ -370,7 +383,7 @@ mod tests {
     #[test]
     fn equal_profiles_have_equal_weights() {
         let other = profiles()[3];
-        let fit = fit(&[Profile::SKIN, other, Profile::SKIN], 0.01, KERNELS[0], 1.0).unwrap();
+        let fit = fit(&[Profile::SKIN, other, Profile::SKIN], KERNELS[0], limits(0.01)).unwrap();
         assert_eq!(fit.profiles[0], fit.profiles[2]);
         assert_ne!(fit.profiles[0], fit.profiles[1]);
     }

@@ -18,6 +18,7 @@ use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use crate::{Error, Profile, validate};
+use fit::Limits;
 use kernels::{KERNELS, Kernels};
 pub(crate) use kernels::{Kinds, Shape, own_blur};
 use stored::Stored;
@@ -100,13 +101,18 @@ impl Plan {
     pub fn new(profiles: &[Profile], max_error: f32) -> Result<Self, Error> {
         validate::profiles(profiles)?;
         check_max_error(max_error)?;
-        let [cheaper @ .., most_exact] = &KERNELS;
-        let fit = |kernels: &Kernels, hopeless| fit::fit(profiles, max_error, *kernels, hopeless);
-        let weights = cheaper
-            .iter()
-            .find_map(|kernels| fit(kernels, max_error))
-            // How far these are off is the least that can be kept.
-            .or_else(|| fit(most_exact, f32::INFINITY));
+        // Blurs that an error does not ask for are left out, which may cost a little more than it allows
+        // between two scales. How far the most exact set is off with all of its blurs is the least that can
+        // be kept.
+        let fit = |kernels: Kernels, spare: f32, hopeless: f32| {
+            let limits = Limits { max_error, spare, hopeless };
+            fit::fit(profiles, kernels, limits)
+        };
+        let [.., most_exact] = KERNELS;
+        let weights = KERNELS
+            .into_iter()
+            .find_map(|kernels| fit(kernels, max_error, max_error))
+            .or_else(|| fit(most_exact, 0.0, f32::INFINITY));
         match weights {
             Some(weights) if weights.predicted_error() <= max_error => {
                 Ok(Self::of(profiles, max_error, weights))

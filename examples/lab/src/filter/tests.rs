@@ -77,11 +77,12 @@ impl Head {
 /// in a float and back may be a place off, here 3e-5 mm, where pixels are .6 mm apart: slopes, by which
 /// areas are weighed, move by 5e-5 between two pixels.
 const APART: f32 = 2e-4;
-/// But for a value or two of each effect, where a place of depth decides something: by a plan, how a half
-/// float between passes is rounded (seen: .0003); by the exact sum, whether a row of pixels strays from the
-/// plane and is summed anew (seen: .0004, and none where the bounds of that are 2 % wider).
+/// By the exact sum but for a value or two, where a place of depth decides whether a row of pixels is off the
+/// plane and is summed anew (seen: .0004, and none where the bounds of that are 2 % wider). A plan keeps light
+/// times area in half floats, which round another way where the area moves: by a step of theirs, 2⁻¹⁰.
 const BEYOND: usize = 2;
 const APART_AT_MOST: f32 = 6e-4;
+const HALF_STEP: f32 = 1.0 / 1024.0;
 
 #[test]
 fn a_dump_scatters_as_the_frame_did() {
@@ -109,7 +110,10 @@ fn a_dump_scatters_as_the_frame_did() {
         let worst = apart.iter().copied().fold(0.0, f32::max);
         let beyond = apart.iter().filter(|a| **a > APART).count();
         println!("{how:?}: {worst:.1e} apart, {beyond} beyond {APART:e}");
-        assert!(worst < APART_AT_MOST && beyond <= BEYOND);
+        match how.contains(&"--max-error") {
+            true => assert!(worst <= HALF_STEP),
+            false => assert!(worst < APART_AT_MOST && beyond <= BEYOND),
+        }
     }
     // Why the user is told of depth in half floats.
     let ours = head.dump(HALVES).run(EXACT).unwrap();
