@@ -216,8 +216,12 @@ struct Gathered {
 const NEGLIGIBLE_WEIGHT = 1e-4;
 
 // The light of a pixel that holds so much for its area.
+fn in_half_floats(light: vec3f) -> vec3f {
+    return clamp(light, vec3f(-65504.0), vec3f(65504.0));
+}
+
 fn light_of(here: vec4f) -> vec3f {
-    return here.rgb / max(here.a, 1e-6);
+    return in_half_floats(here.rgb / max(here.a, 1e-6));
 }
 
 // The part that blurs have of the light, from what their taps found and what these weigh; of a weight that
@@ -237,7 +241,7 @@ fn with_coarser(blurred: vec3f, wanted: vec3f, e: vec3f, rest: vec3f, coarser: v
 // scales of their own.
 fn mean_of(g: Gathered) -> vec4f {
     let mean = select(g.own, g.light / max(g.weight, vec3f(1e-6)), g.weight > vec3f(1e-3));
-    return half_floats(vec4f(mean, 1.0));
+    return half_floats(vec4f(in_half_floats(mean), 1.0));
 }
 
 // What fs_frame tells of a pixel that takes so much of its scattered light: all of it, or, to be added, what

@@ -133,6 +133,14 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
             g.weight += w1;
         }
     }
+    // Levels that a small frame lacks: what the last one holds stands for them.
+    let beyond = weight_at(scale, level.rest + view.levels);
+    if any(beyond > vec3f(0.0)) {
+        let last = min(pixel >> vec2u(view.levels), vec2i(textureDimensions(lights, view.levels)) - 1);
+        let there = textureLoad(lights, last, view.levels);
+        g.light += beyond * select(e, there.rgb / there.a, there.a > 1e-6);
+        g.weight += beyond;
+    }
     return g;
 }
 

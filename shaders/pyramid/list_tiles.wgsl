@@ -60,6 +60,9 @@ fn contents_in_reach(l: u32, tile: vec2i) -> Contents {
 
 // What pixels without skin are taken for.
 const HOLES = 1.0;
+// How many times more is in doubt where depth makes a step, for a tile to be planar: light then may come from
+// another layer.
+const STEPS_OF_DEPTH = 4.0;
 
 // Whether pixels are so far from square that blurs of few taps do not fit them, and not so far that steps of
 // two pixels do.
@@ -94,7 +97,9 @@ fn class_of(tile: vec2i, l: u32) -> u32 {
         }
     }
     let mixes = countOneBits(around.marks & PROFILES) > 1u;
-    if mixes || doubt(contents_in_reach(l, tile), l) > view.planar_limit {
+    let reached = contents_in_reach(l, tile);
+    let has_step = ((reached.marks >> DIFFICULTY_SHIFT) & 8u) != 0u;
+    if mixes || doubt(reached, l) * select(1.0, STEPS_OF_DEPTH, has_step) > view.planar_limit {
         return GENERAL;
     }
     return PLANAR;

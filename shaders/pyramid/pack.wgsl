@@ -65,6 +65,16 @@ fn difficulty_bits(bend: f32) -> u32 {
     return dot(vec4u(passed), vec4u(1u, 2u, 4u, 8u)) << DIFFICULTY_SHIFT;
 }
 
+const MOST_LIGHT = 65504.0;
+
+// Light times area, and area, in what half floats hold: where the light is too bright for that it weighs
+// less, and keeps its color.
+fn area_weighed(host: vec3f, area: f32) -> vec4f {
+    let light = clamp(host, vec3f(-MOST_LIGHT), vec3f(MOST_LIGHT));
+    let most = max(max(abs(light.r), abs(light.g)), abs(light.b)) * area;
+    return vec4f(light * area, area) * min(1.0, MOST_LIGHT / max(most, 1.0));
+}
+
 // Packs a pixel of the viewport, and adds what it holds to what its tile does.
 fn pack(pixel: vec2i) {
     let pixel_of_host = vec2i(view.first_pixel) + pixel;
@@ -93,15 +103,23 @@ fn pack(pixel: vec2i) {
     let plane = plane_of(pixel, shape);
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
     let sines = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);
-    // Light that is no number goes no further. What is packed is half floats, which end there.
     let host = textureLoad(irradiance, pixel_of_host, 0).rgb;
-    let light = select(vec4f(0.0), vec4f(host * area, area), is_finite(host));
-    textureStore(packed_light, pixel, half_floats(clamp(light, vec4f(-65504.0), vec4f(65504.0))));
+    var light = vec4f(0.0);
+    var difficulty = difficulty_bits(bend);
+    var brightness = MOST_LIGHT;
+    if is_finite(host) {
+        light = area_weighed(host, area);
+        brightness = max(max(host.r, host.g), max(host.b, 0.0));
+    } else {
+        // Light that is no number weighs nothing. Such a pixel takes what is around it, which planar tiles
+        // do not look for.
+        difficulty = difficulty_bits(MOST_LIGHT);
+    }
+    textureStore(packed_light, pixel, half_floats(light));
     textureStore(packed_shape, pixel, vec4u(packed(id, z, sines), 0u, 0u));
-    atomicOr(&marks, (1u << coarsest_level(z, id)) | difficulty_bits(bend) | (1u << (PROFILE_SHIFT + id - 1u)));
-    let brightness = bitcast<u32>(max(max(host.r, host.g), max(host.b, 0.0)));
-    atomicMax(&brightest, brightness);
-    atomicMax(&darkest, ~brightness);
+    atomicOr(&marks, (1u << coarsest_level(z, id)) | difficulty | (1u << (PROFILE_SHIFT + id - 1u)));
+    atomicMax(&brightest, bitcast<u32>(brightness));
+    atomicMax(&darkest, ~bitcast<u32>(brightness));
 }
 
 @compute @workgroup_size(TILE, TILE)

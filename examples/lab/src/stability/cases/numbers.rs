@@ -376,7 +376,7 @@ fn width((name, sigma_mm): (&str, f32), side: u32) -> Case {
         };
         Ok(worst(&results, &asked.into_iter().zip(truth).collect()).into())
     })
-    .known((sigma_mm > 0.0).then(|| known(PLAN, if narrow { 0.005 } else { 0.05 }, why)))
+    .known((sigma_mm > 0.0).then(|| known(PLAN, if narrow { 0.0055 } else { 0.05 }, why)))
 }
 
 /// The same scene in other units.
