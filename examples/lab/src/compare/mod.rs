@@ -142,9 +142,9 @@ fn options() -> Result<Option<Options>, Error> {
             "exposure" => options.exposure = positive("--exposure", &text()?)?,
             "texture-size" => {
                 let text = text()?;
-                options.texture_size = text
-                    .parse()
-                    .map_err(|_| Error::new("--texture-size", text, "a whole number of texels"))?;
+                let texels = text.parse().ok().filter(|n| *n > 0);
+                let needs = "a whole number of texels, 1 or more";
+                options.texture_size = texels.ok_or_else(|| Error::new("--texture-size", text, needs))?;
             }
             _ => {
                 return Err(refused(lexopt::Error::UnexpectedOption(format!("--{name}"))));
