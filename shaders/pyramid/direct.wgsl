@@ -35,7 +35,7 @@ const NARROWEST_IN_SPACE = 0.25;
 
 // What of this variance in square pixels has the variance asked for on a lattice of pixels, where few weigh
 // anything.
-fn lattice_variance(v: f32) -> f32 {
+fn widened_on_lattice(v: f32) -> f32 {
     return max(v, 0.13 + 0.37 * v);
 }
 
@@ -46,7 +46,7 @@ fn on_plane(variance_mm2: f32, in_space: f32, m: vec3f, own: f32) -> vec3f {
     var c = variance_mm2 / max(det, 1e-30) * vec3f(m.z, -m.y, m.x) - own * vec3f(1.0, 0.0, 1.0);
     c = vec3f(max(c.x, 0.02), c.y, max(c.z, 0.02));
     if own == 0.0 {
-        let wider = vec2f(lattice_variance(c.x), lattice_variance(c.z));
+        let wider = vec2f(widened_on_lattice(c.x), widened_on_lattice(c.z));
         c = vec3f(wider.x, c.y * sqrt(wider.x / c.x * (wider.y / c.z)), wider.y);
     }
     let most = 0.98 * sqrt(c.x * c.z);
