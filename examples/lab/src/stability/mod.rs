@@ -24,7 +24,7 @@ use crate::Error;
 use case::{Case, GROUPS, Judged};
 pub use cases::sizes;
 use lab::Lab;
-use options::Options;
+pub use options::Options;
 use report::Report;
 
 pub fn main() -> ExitCode {
@@ -37,7 +37,10 @@ pub fn main() -> ExitCode {
 }
 
 /// Runs the cases and writes what came out; what is worse than it is known to be, a line each.
-fn atlas(options: &Options) -> Result<Vec<String>, Error> {
+///
+/// # Errors
+/// No case of that name, no adapter, a case that could not be run, or files that cannot be written.
+pub fn atlas(options: &Options) -> Result<Vec<String>, Error> {
     let started = Instant::now();
     let mut cases = cases::all(options.quick);
     cases.retain(|case| options.wants(&case.title()));

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use subsurface::{DEFAULT_MAX_ERROR, Plan, Profile};
 
-use super::{EVEN, GRADIENT, PROMISE, REACH_MM};
+use super::{EVEN, GRADIENT, PROMISE, REACH_MM, noise};
 use crate::Error;
 use crate::stability::case::{ATLAS, Case, EXACT, Outcome, PLAN, known};
 use crate::stability::inputs::Texels;
@@ -40,12 +40,10 @@ fn flat(side: u32, id: impl Fn(DVec2) -> u32) -> GBuffer {
     })
 }
 
-/// Half of all pixels, at random: a hash of the pixel that a place lies in.
+/// Half of all pixels, at random, by the pixel that a place lies in.
 fn at_random(place_mm: DVec2) -> bool {
     let pixel = (place_mm * PX_PER_MM).floor().as_ivec2();
-    let mut bits = (pixel.x as u32).wrapping_mul(0x9e37_79b1) ^ (pixel.y as u32).wrapping_mul(0x85eb_ca77);
-    bits = (bits ^ (bits >> 15)).wrapping_mul(0x2c1b_3c6d);
-    (bits ^ (bits >> 12)) & 1 == 0
+    noise([pixel.x as u32, pixel.y as u32]) < 0.5
 }
 
 /// Cloth, which has the id 0, on the skin, at the same depth.

@@ -67,6 +67,14 @@ pub fn all(quick: bool) -> Vec<Case> {
     groups.into_iter().flat_map(named).collect()
 }
 
+/// White noise: a number from 0 to 1 that a hash gives a pixel.
+fn noise([x, y]: [u32; 2]) -> f64 {
+    let mut bits = x.wrapping_mul(0x9e37_79b1) ^ y.wrapping_mul(0x85eb_ca77);
+    bits = (bits ^ (bits >> 15)).wrapping_mul(0x2c1b_3c6d);
+    bits = (bits ^ (bits >> 12)).wrapping_mul(0x297a_2d39);
+    f64::from(bits ^ (bits >> 15)) / f64::from(u32::MAX)
+}
+
 /// A case of one frame.
 fn trial(
     name: impl Into<String>,

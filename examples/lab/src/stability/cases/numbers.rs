@@ -7,9 +7,11 @@ use half::f16;
 use subsurface::wgpu::{self, ErrorFilter};
 use subsurface::{Gaussian, Plan, Profile};
 
-use super::{EVEN, GRADIENT};
+use super::{EVEN, GRADIENT, noise};
 use crate::Error;
-use crate::stability::case::{ATLAS, Bound, Case, Figures, Outcome, PLAN, Results, known};
+use crate::stability::case::{
+    ATLAS, Bound, Case, EXACT, Figures, Outcome, PLAN, Results, by_nature, known,
+};
 use crate::stability::inputs::Texels;
 use crate::stability::lab::{Lab, OUTPUT, methods, ours};
 use crate::stability::trial::{Crop, Known, apart, worst};
@@ -22,6 +24,7 @@ pub fn cases(quick: bool) -> Vec<Case> {
     cases.extend(lost_light(side));
     cases.push(negative(side));
     cases.extend(depths(side));
+    cases.extend(stored_depths(side));
     cases.extend([[1, 1], [1, 4096], [4096, 1], [127, 61], [128, 64]].map(small));
     cases.push(too_large());
     if !quick {
@@ -215,6 +218,63 @@ fn depths(side: u32) -> [Case; 5] {
         let looks_alike = value == f32::INFINITY || value == -1.0;
         case.known(value.is_nan().then(|| known(ATLAS, f64::INFINITY, why))).pictured(!looks_alike)
     })
+}
+
+/// Depth as hosts store it: in few bits, in steps, with noise.
+fn stored_depths(side: u32) -> Vec<Case> {
+    let what = "A ball of 12 mm lit from 60 degrees to the side, 300 mm away, 3 px/mm, near plane at \
+        10 mm: largest difference to the visible integral over the depth as it was, where turned by less \
+        than 60 degrees. A step of 16 bits is 0.14 mm there: distance² / (near plane × 65536). Dithered: \
+        rounded up or down at random, so that the mean is right. Noise: even, up to that either way.";
+    // From a distance, and a number from 0 to 1 that differs from pixel to pixel, to a distance.
+    type Store = fn(f64, f64) -> f64;
+    let stored: [(&str, Store); 8] = [
+        ("in 24 bits", |z, _| in_bits(z, 24, 0.5)),
+        ("in 16 bits", |z, _| in_bits(z, 16, 0.5)),
+        ("in 16 bits, dithered", |z, u| in_bits(z, 16, u)),
+        ("in steps of 0.02 mm", |z, _| (z / 0.02).round() * 0.02),
+        ("in steps of 0.5 mm", |z, _| (z / 0.5).round() * 0.5),
+        ("with noise of 0.02 mm", |z, u| z + (2.0 * u - 1.0) * 0.02),
+        ("with noise of 0.1 mm", |z, u| z + (2.0 * u - 1.0) * 0.1),
+        ("with noise of 2 mm", |z, u| z + (2.0 * u - 1.0) * 2.0),
+    ];
+    let case = |(name, store): (&str, Store)| {
+        let case = Case::new(format!("depth {name}"), what, GRADIENT, move |lab| {
+            let to_light = DVec3::new(0.75f64.sqrt(), 0.0, 0.5);
+            let g = ball(side, |n| n.dot(to_light).max(0.0));
+            let mut texels = Texels::of(&g, 0.0);
+            for (i, hit) in g.hits.iter().enumerate() {
+                if let Some(hit) = hit {
+                    let stored_mm = store(-hit.point.z, noise([i as u32 % side, i as u32 / side]));
+                    texels.depth[i] = (NEAR_MM / stored_mm) as f32;
+                }
+            }
+            let inputs = texels.upload(&lab.gpu);
+            let results = lab.scatter(&inputs.frame(), &inputs.output)?;
+            let faces = |i: &usize| g.hits[*i].is_some_and(|hit| hit.normal.z > 0.5);
+            let asked: Vec<usize> = (0..g.hits.len()).filter(faces).step_by(3).collect();
+            let truth = g.visible_integral(&asked, &Profile::SKIN);
+            let truth = asked.into_iter().zip(truth).collect();
+            let crop = Crop { first: [side / 4; 2], size: [side / 2; 2] };
+            Ok(Outcome { figures: worst(&results, &truth), shown: Some(crop.show(side, &results, &truth)) })
+        });
+        let why = "Each pixel is a surface of its own then, 2 mm from the next, and hardly any light crosses. \
+            Hand over the depth of the mesh, from before noise or offsets of pixels are added to it.";
+        let is_torn = name == "with noise of 2 mm";
+        let torn = [EXACT, PLAN].map(|method| by_nature(method, 0.04, why));
+        case.known(is_torn.then_some(torn).into_iter().flatten()).pictured(is_torn)
+    };
+    stored.map(case).into()
+}
+
+/// Of [`View::perspective`].
+const NEAR_MM: f64 = 10.0;
+
+/// A distance whose reversed, infinite depth is stored in so many bits; `up` from 0 to 1 says where between two
+/// steps it is rounded.
+fn in_bits(z_mm: f64, bits: i32, up: f64) -> f64 {
+    let steps = f64::from(bits).exp2() - 1.0;
+    NEAR_MM / ((NEAR_MM / z_mm * steps + up).floor() / steps)
 }
 
 /// Flat skin at 6 px/mm, lit by waves 4 mm long at 27 degrees to the rows, from the first pixel on.
