@@ -59,27 +59,6 @@ fn no_width_is_the_identity() {
 }
 
 #[test]
-fn blurred_edges_match_the_closed_form() {
-    for px_per_mm in [0.5, 1.0, 2.0, 4.0, 12.0] {
-        for angle in [0.0, 27.0, 45.0, 90.0] {
-            let view = View::orthographic([400, 400], px_per_mm);
-            let across = direction(angle);
-            // Pre-blurred by a pixel, so that the pixels can tell where the edge is.
-            let blur_mm2 = px_per_mm.powi(-2);
-            let g = view.shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(step(p.dot(across), blur_mm2))));
-            let out = g.scatter(&Profile::SKIN);
-            let mut worst: f64 = 0.0;
-            for (i, hit) in g.pixels(inside(&view, px_per_mm)) {
-                let truth = scattered_step(hit.point.dot(across), blur_mm2, &Profile::SKIN);
-                worst = worst.max((out[i] - truth).abs().max_element());
-            }
-            println!("{px_per_mm} px/mm, {angle}°: max error {worst:.5}");
-            assert!(worst <= STEP, "{px_per_mm} px/mm, {angle}°: max error {worst}");
-        }
-    }
-}
-
-#[test]
 fn hard_edges_match_the_visible_sum() {
     for px_per_mm in [1.5, 4.0, 8.0] {
         for angle in [0.0, 27.0, 45.0] {
@@ -183,30 +162,6 @@ fn a_plane_in_perspective_matches_the_closed_form() {
 }
 
 #[test]
-fn a_sphere_matches_eq_7() {
-    let rho_mm = 10.0;
-    let light = DVec3::new(1.0, 0.0, 1.0).normalize();
-    let truth = scattered_cosine(rho_mm, &Profile::SKIN);
-    for px_per_mm in [4.0, 12.0] {
-        let size = (2.2 * rho_mm * px_per_mm) as u32;
-        let view = View::orthographic([size, size], px_per_mm);
-        let g = view.shoot(sphere(rho_mm, 300.0, |n| DVec3::splat(n.dot(light).max(0.0))));
-        let out = g.scatter(&Profile::SKIN);
-        let error = |select: &dyn Fn(&Hit) -> bool| {
-            rms(g.pixels(select).iter().map(|(i, h)| out[*i].x - truth(h.normal.dot(light)).x))
-        };
-        let (whole, interior) = (error(&|_| true), error(&|h| h.normal.z > 0.35));
-        let none =
-            rms(g.pixels(|_| true).iter().map(|(_, h)| h.irradiance.x - truth(h.normal.dot(light)).x));
-        println!("{px_per_mm} px/mm: red RMS {whole:.5}, n_z > .35 {interior:.5}, unscattered {none:.5}");
-        // What the hidden half contributes is missing at the rim, whatever the method: that is most
-        // of the .0045 measured.
-        assert!(whole <= 0.005, "whole sphere: {whole}");
-        assert!(interior <= 0.002, "interior: {interior}");
-    }
-}
-
-#[test]
 fn a_sphere_matches_the_visible_sum() {
     let light = DVec3::new(-0.6, 0.5, 0.62).normalize();
     let view = View::perspective([256, 256], 30.0);
@@ -221,40 +176,6 @@ fn a_sphere_matches_the_visible_sum() {
     // Two passes over a sphere are not the full sum: .0016 measured, at the rim, against .0108 that
     // scattering does. Blue scatters too narrowly to see the bend.
     assert!(red <= 0.002 && blue <= 0.0001, "red {red}, blue {blue}");
-}
-
-#[test]
-fn layers_leak_what_the_visible_sum_says() {
-    for gap_mm in [2.0, 5.0, 10.0] {
-        for angle in [0.0, 90.0, 20.0, 45.0] {
-            let view = View::orthographic([256, 256], 4.0);
-            let across = direction(angle);
-            // The nearer layer, dark, hides half of a lit one.
-            let near = plane(DVec3::Z, 300.0 - gap_mm, |_| DVec3::ZERO);
-            let far = plane(DVec3::Z, 300.0, |_| DVec3::ONE);
-            let g = view.shoot(|origin, ray| {
-                near(origin, ray).filter(|hit| hit.point.dot(across) < 0.0).or_else(|| far(origin, ray))
-            });
-            let out = g.scatter(&Profile::SKIN);
-            let pixels: Vec<_> = g
-                .pixels(|h| h.point.dot(across).abs() < 6.0 && h.point.truncate().length() < 20.0)
-                .into_iter()
-                .step_by(97)
-                .collect();
-            let mut worst: f64 = 0.0;
-            let mut leak: f64 = 0.0;
-            let places: Vec<usize> = pixels.iter().map(|(i, _)| *i).collect();
-            for (error, (i, hit)) in g.errors(&out, &places).iter().zip(&pixels) {
-                worst = worst.max(error.abs().max_element());
-                if hit.irradiance == DVec3::ZERO {
-                    leak = leak.max(out[*i].max_element());
-                }
-            }
-            println!("{gap_mm} mm, edge at {angle}°: max error {worst:.5}, leak {leak:.5}");
-            assert!(worst <= 0.002, "{gap_mm} mm, {angle}°: {worst} from the visible sum");
-            assert!(gap_mm < 10.0 || leak <= 0.0005, "{gap_mm} mm, {angle}°: leak {leak}");
-        }
-    }
 }
 
 /// Distance in mm between a quarter and three quarters of an edge's height, across `across`: x or y.

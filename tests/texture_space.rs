@@ -127,25 +127,6 @@ fn a_sphere_matches_eq_7() {
 }
 
 #[test]
-fn islands_do_not_run_into_each_other() {
-    // Two islands a texel apart in the atlas and a metre apart in space.
-    let size = 128;
-    let island = |t: DVec2| t.x < 63.0 || t.x > 65.0;
-    let texel = |t: DVec2| {
-        let far = t.x > 64.0;
-        let p = (t * 0.2).extend(if far { 1000.0 } else { 0.0 });
-        island(t).then(|| (p, if far { DVec3::ONE } else { DVec3::new(0.25, 0.5, 0.0) }))
-    };
-    let out = scatter(size, &Profile::SKIN, texel);
-    for (i, e) in out.iter().enumerate() {
-        if let Some((_, before)) = texel(center(i, size)) {
-            // Rounding only.
-            assert!((*e - before).abs().max_element() < 1e-5, "texel {i}: {e}");
-        }
-    }
-}
-
-#[test]
 fn islands_are_dilated() {
     let size = 64;
     let inside = |t: DVec2| (t - 32.0).abs().max_element() < 16.0;
