@@ -85,7 +85,7 @@ fn masks(quick: bool) -> Vec<Case> {
     };
     vec![
         case("ids meet in a line", PROMISE, [0.015, 0.018], |p| p.y < 0.0),
-        case("half of the ids, at random", GRADIENT, [0.026, 0.037], at_random).pictured(false),
+        case("half of the ids, at random", GRADIENT, [0.034, 0.044], at_random).pictured(false),
         case("a net of ids", GRADIENT, [0.008, 0.027], threads),
         case("straps of ids", GRADIENT, [0.027, 0.03], straps).pictured(false),
         case("a hole of ids", GRADIENT, [0.0195, 0.0195], |p| p.length() < 3.0).pictured(false),
