@@ -3,11 +3,9 @@
 use std::sync::OnceLock;
 
 use glam::{DVec2, DVec3};
-use subsurface::wgpu::TextureFormat;
-use subsurface::{Error, Frame, Plan, Profile};
-use subsurface_lab::method::{self, Ours};
+use subsurface::{Error, Plan, Profile};
 use subsurface_lab::synthetic::*;
-use subsurface_lab::truth::closed_form::{scattered_cosine, scattered_step, step};
+use subsurface_lab::truth::closed_form::{scattered_step, step};
 
 /// Plans of the skin profile at 1/100 and 1/255.
 fn plans() -> &'static [Plan; 2] {

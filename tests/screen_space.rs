@@ -4,7 +4,7 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 use subsurface::wgpu::TextureFormat;
 use subsurface::{Gaussian, Profile};
 use subsurface_lab::synthetic::*;
-use subsurface_lab::truth::closed_form::{scattered_cosine, scattered_step, step};
+use subsurface_lab::truth::closed_form::{scattered_step, step};
 
 /// A step of this error in a picture is one step of eight bits.
 const STEP: f64 = 1.0 / 255.0;
