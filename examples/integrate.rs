@@ -1,12 +1,13 @@
 //! The smallest host: hands a frame to the effect in screen space and an atlas to the one in texture space,
 //! and reads both results back. Choosing the mode is choosing which of them a final pass samples.
 //!
-//! Both inputs are made up on the CPU, a plane lit on its right half; a renderer hands over the textures
-//! that it has. What a host writes is `struct Skin` or `struct SkinAtlas`, and their functions.
+//! All inputs are made up on the CPU: a plane lit on its right half, and, for light from behind, another face
+//! 2 mm behind it that is lit on its left half. A renderer hands over the textures that it has. What a host
+//! writes is `struct Skin` or `struct SkinAtlas`, and their functions.
 
 use glam::Mat4;
 use subsurface::wgpu::{CommandEncoder, Device, Queue, TextureFormat, TextureView};
-use subsurface::{Atlas, Error, Frame, Plan, Profile, ScreenSpace, TextureSpace, View};
+use subsurface::{Atlas, BackLayer, Error, Frame, Plan, Profile, ScreenSpace, TextureSpace, View};
 use subsurface_lab::renderer::Gpu;
 
 /// What the deferred renderer has by the time its diffuse light is done.
@@ -15,6 +16,8 @@ struct GBuffer {
     depth: TextureView,
     profile_id: TextureView,
     projection: Mat4,
+    /// Irradiance and depth of the skin right behind what is seen; optional.
+    back: Option<[TextureView; 2]>,
 }
 
 // The integration, as README.md shows it.
@@ -42,6 +45,8 @@ impl Skin {
         let mut frame = Frame::new(&g.irradiance, &g.depth, g.projection.to_cols_array_2d());
         frame.profile_id = Some(&g.profile_id); // 1 on skin, 0 elsewhere
         frame.mm_per_unit = 1000.0; // a scene in metres
+        let back = g.back.as_ref(); // for light from behind: ears, nostrils, fingers
+        frame.back = back.map(|[irradiance, depth]| BackLayer { irradiance, depth, profile_id: None });
         self.view.prepare(device, queue, &self.effect, &frame)?;
         self.view.render(encoder, scattered)
     }
@@ -85,27 +90,31 @@ impl SkinAtlas {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let gpu = Gpu::headless()?;
-    let frame = made_up_frame(&gpu);
+    let [frame, lit_from_behind] = [false, true].map(|has_back| made_up_frame(&gpu, has_back));
     let unrolled = made_up_atlas(&gpu);
-    let [on_screen, on_atlas] =
-        ["scattered", "scattered atlas"].map(|name| gpu.target(name, SIZE, TextureFormat::Rgba16Float));
+    let [on_screen, on_atlas, through] = ["scattered", "scattered atlas", "scattered through"]
+        .map(|name| gpu.target(name, SIZE, TextureFormat::Rgba16Float));
     let mut skin = Skin::new(&gpu.device)?;
+    // A view for each frame of a submission.
+    let mut thin_skin = Skin { effect: skin.effect.clone(), view: View::new() };
     let mut atlas = SkinAtlas::new(&gpu.device)?;
     let (device, queue) = (&gpu.device, &gpu.queue);
     let mut encoder = device.create_command_encoder(&Default::default());
     skin.scatter(device, queue, &mut encoder, &frame, &on_screen)?;
+    thin_skin.scatter(device, queue, &mut encoder, &lit_from_behind, &through)?;
     atlas.scatter(device, queue, &mut encoder, &unrolled, &on_atlas)?;
     queue.submit([encoder.finish()]);
 
     let screen = gpu.read(&on_screen);
     let texture = gpu.read(&on_atlas);
-    println!("        screen space         texture space");
-    println!("   mm   red  green   blue    red  green   blue");
+    let through = gpu.read(&through);
+    println!("        screen space         texture space        lit from behind, too");
+    println!("   mm   red  green   blue    red  green   blue    red  green   blue");
     let [width, _] = SIZE.map(|s| s as usize);
     for x in (width / 2 - 12..width / 2 + 12).step_by(2) {
         let mm = (x as f32 + 0.5 - width as f32 / 2.0) / PX_PER_MM;
-        let ([r, g, b, _], [s, t, u, _]) = (screen[x], texture[x]);
-        println!("{mm:5.2} {r:6.3} {g:6.3} {b:6.3} {s:6.3} {t:6.3} {u:6.3}");
+        let ([r, g, b, _], [s, t, u, _], [v, w, z, _]) = (screen[x], texture[x], through[x]);
+        println!("{mm:5.2} {r:6.3} {g:6.3} {b:6.3} {s:6.3} {t:6.3} {u:6.3} {v:6.3} {w:6.3} {z:6.3}");
     }
     Ok(())
 }
@@ -119,11 +128,17 @@ fn light() -> Vec<[f32; 4]> {
     (0..SIZE[0] * SIZE[1]).map(|i| [lit(i); 4]).collect()
 }
 
-/// A plane half a metre away.
-fn made_up_frame(gpu: &Gpu) -> GBuffer {
+/// A plane half a metre away, and maybe its back.
+fn made_up_frame(gpu: &Gpu, has_back: bool) -> GBuffer {
     let count = (SIZE[0] * SIZE[1]) as usize;
     let half = SIZE.map(|s| s as f32 / PX_PER_MM / 2000.0);
+    let dark: Vec<[f32; 4]> = light().iter().map(|e| e.map(|c| 1.0 - c)).collect();
+    let back = || {
+        let light = gpu.upload("irradiance of the back", SIZE, TextureFormat::Rgba32Float, &dark);
+        [light, gpu.upload("depth of the back", SIZE, TextureFormat::R32Float, &vec![0.502f32; count])]
+    };
     GBuffer {
+        back: has_back.then(back),
         irradiance: gpu.upload("irradiance", SIZE, TextureFormat::Rgba32Float, &light()),
         depth: gpu.upload("depth", SIZE, TextureFormat::R32Float, &vec![0.5f32; count]),
         profile_id: gpu.upload("profile id", SIZE, TextureFormat::R8Uint, &vec![1u8; count]),

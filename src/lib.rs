@@ -46,7 +46,7 @@ mod validate;
 mod wgsl;
 
 pub use error::Error;
-pub use frame::{Frame, Output, Viewport};
+pub use frame::{BackLayer, Frame, Output, Viewport};
 pub use overlay::{Overlay, Show};
 pub use plan::{DEFAULT_MAX_ERROR, Plan};
 pub use profile::{Gaussian, Profile};

@@ -65,7 +65,15 @@ impl ScreenSpace {
     pub fn scratch_bytes(&self, size: [u32; 2]) -> u64 {
         match &self.shared.passes {
             Passes::Pyramid(pyramid) => pyramid.scratch_bytes(size),
-            Passes::Exact(_) => exact::BYTES_PER_PIXEL * u64::from(size[0]) * u64::from(size[1]),
+            Passes::Exact(_) => exact::scratch_bytes(size),
+        }
+    }
+
+    /// Bytes that it takes on top where frames have a [`BackLayer`](crate::BackLayer).
+    pub fn back_scratch_bytes(&self, size: [u32; 2]) -> u64 {
+        match &self.shared.passes {
+            Passes::Pyramid(_) => 0,
+            Passes::Exact(_) => exact::back_scratch_bytes(size),
         }
     }
 }

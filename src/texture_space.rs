@@ -61,7 +61,7 @@ impl TextureSpace {
         Ok(Self {
             output,
             profiles: profiles.to_vec(),
-            sum: GaussianSum::new(device, output, "subsurface::TextureSpace"),
+            sum: GaussianSum::new(device, output, "subsurface::TextureSpace", false),
             sums: None,
         })
     }
@@ -86,6 +86,7 @@ impl TextureSpace {
             irradiance: atlas.irradiance.clone(),
             strength: atlas.irradiance.clone(),
             albedo: atlas.irradiance.clone(),
+            back: None,
         };
         let settings = Settings { gutter: GUTTER, ..Settings::new(&self.profiles, atlas.mm_per_unit) };
         let inputs = Inputs::new(&self.profiles, textures, settings, None);

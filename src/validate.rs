@@ -48,8 +48,8 @@ pub(crate) fn frame(frame: &Frame, output: Output) -> Result<(), Error> {
     let size = frame.size();
     for (input, view) in frame.textures() {
         let role = match input {
-            "depth" => Role::Depth,
-            "profile_id" => Role::Id,
+            "depth" | "back.depth" => Role::Depth,
+            "profile_id" | "back.profile_id" => Role::Id,
             "strength" => Role::Strength,
             _ => Role::Color,
         };

@@ -4,7 +4,9 @@ use std::sync::OnceLock;
 
 use glam::Mat4;
 use subsurface::wgpu::{self, TextureFormat, TextureUsages, TextureView};
-use subsurface::{Atlas, Error, Frame, Output, Plan, Profile, ScreenSpace, TextureSpace, Viewport};
+use subsurface::{
+    Atlas, BackLayer, Error, Frame, Output, Plan, Profile, ScreenSpace, TextureSpace, Viewport,
+};
 use subsurface_lab::synthetic::{View, gpu};
 
 const SIZE: [u32; 2] = [16, 8];
@@ -55,6 +57,8 @@ struct Inputs {
     profile_id: Option<TextureView>,
     strength: Option<TextureView>,
     albedo: Option<TextureView>,
+    back: Option<[TextureView; 2]>,
+    back_id: Option<TextureView>,
     output: TextureView,
     viewport: Option<Viewport>,
     projection: Mat4,
@@ -69,6 +73,8 @@ impl Inputs {
             profile_id: Some(view(TextureFormat::R8Uint)),
             strength: None,
             albedo: None,
+            back: None,
+            back_id: None,
             output: view(HALF),
             viewport: None,
             projection: View::perspective(SIZE, 40.0).projection.as_mat4(),
@@ -82,6 +88,9 @@ impl Inputs {
         frame.profile_id = self.profile_id.as_ref();
         frame.strength = self.strength.as_ref();
         frame.albedo = self.albedo.as_ref();
+        let back = self.back.as_ref();
+        let profile_id = self.back_id.as_ref();
+        frame.back = back.map(|[irradiance, depth]| BackLayer { irradiance, depth, profile_id });
         frame.viewport = self.viewport;
         frame.mm_per_unit = self.mm_per_unit;
         frame
@@ -116,6 +125,34 @@ fn pollster<T>(future: impl Future<Output = T>) -> T {
         std::task::Poll::Ready(value) => value,
         std::task::Poll::Pending => panic!("the error scope is still open"),
     }
+}
+
+#[test]
+fn a_back_layer_that_does_not_fit_is_named() {
+    use TextureFormat::{Depth32Float, R8Uint, R16Float};
+    let of = |light, depth| screen(|i| i.back = Some([light, depth]));
+    assert_eq!(of(view(HALF), view(Depth32Float)), Ok(()));
+    let named = |result: Result<(), Error>, start: &str| {
+        let error = result.unwrap_err().to_string();
+        assert!(error.starts_with(start), "{error}");
+    };
+    named(of(view(R16Float), view(Depth32Float)), "back.irradiance: format: got R16Float");
+    named(of(view(HALF), view(HALF)), "back.depth: format: got Rgba16Float");
+    named(of(view(HALF), small(Depth32Float)), "back.depth: size: got 8x8, needs 16x8");
+    named(
+        screen(|i| {
+            i.back = Some([view(HALF), view(Depth32Float)]);
+            i.back_id = Some(small(R8Uint));
+        }),
+        "back.profile_id: size: got 8x8",
+    );
+    named(
+        screen(|i| {
+            i.back = Some([view(HALF), view(Depth32Float)]);
+            i.output = i.back.as_ref().map(|[light, _]| light.clone()).unwrap();
+        }),
+        "output: got the texture of back.irradiance",
+    );
 }
 
 #[test]

@@ -4,7 +4,7 @@
 //   L(p) = Σᵢ wᵢ · Σ_q E(q) A(q) exp(−|q−p|²/2vᵢ) / Σ_q A(q) exp(−|q−p|²/2vᵢ)
 //
 // Passes: fs_source, then for each Gaussian fs_rows and fs_sum, then one of fs_resolve, fs_add and
-// fs_difference.
+// fs_difference. With a back layer fs_sum_layers of back_layer.wgsl takes the place of fs_sum.
 //
 // [LS15]  Li & Shao 2015, "GPU-based face rendering via the physical model of light interaction with
 //         human skin", Eq. 7–12. Their Eq. 10 lacks 1/v; the division above makes up for it.
@@ -160,9 +160,9 @@ fn one_sided(a: vec3f, beyond: Point, next: Point) -> vec3f {
     let a2 = dot(a, a);
     let b2 = dot(a + c, a + c);
     let turn = dot(a, c) * inverseSqrt(max(a2 * dot(c, c), 1e-30));
-    // A turn by 45 degrees is a ridge; and no more than the last turn once again, since where exactly a rim
+    // A turn by 45 degrees is a ridge; and no more than the last turn twice again, since where exactly a rim
     // ends is not known.
-    let on = saturate(5.0 * (turn - 0.7)) * clamp(a2 / max(b2 - 2.0 * a2, 1e-20), 0.0, 1.0);
+    let on = saturate(5.0 * (turn - 0.7)) * clamp(a2 / max(b2 - 2.0 * a2, 1e-20), 0.0, 2.0);
     return a + on * (a - c);
 }
 
@@ -458,7 +458,33 @@ fn sheared_rows(pixel: vec2i, here: Point, m: Metric, reach: vec2i, v: f32, larg
     return total;
 }
 
-// [LS15] Eq. 11: adds one Gaussian's part, divided by its own mass, to those before it.
+// Σ w·A·E and Σ w·A of a Gaussian over the surface around a pixel.
+fn front_sum(pixel: vec2i, here: Point, m: Metric, g: vec4f) -> vec4f {
+    let l = m.lattice;
+    // Without area there is no lattice: but for no variance at all, what is endless is not small.
+    let inverse = vec3f(l.z, -l.y, l.x) / max(l.x * l.z - l.y * l.y, 1e-24);
+    let steps = along_steps(g.w * inverse);
+    if all(steps.rho <= vec3f(SMALL)) && all(steps.rho > vec3f(-1e-3)) {
+        return small(pixel, here, l, steps);
+    }
+    return sheared_rows(pixel, here, m, reach(m.spacing, g.w), g.w, max(g.r, max(g.g, g.b)));
+}
+
+// [LS15] Eq. 11: one Gaussian's part, divided by its own mass, added to those before it.
+fn with_gaussian(vertex: Vertex, g: vec4f, total: vec4f) -> vec4f {
+    let pixel = vec2i(vertex.position.xy);
+    var before = vec3f(0.0);
+    if vertex.gaussian > 0u {
+        before = textureLoad(sum, pixel, 0).rgb;
+    }
+    if total.a <= 0.0 {
+        // No area to speak of: nothing to share with.
+        return vec4f(before + g.rgb * own_light(pixel), 1.0);
+    }
+    return vec4f(before + g.rgb * total.rgb / total.a, 1.0);
+}
+
+// The sum of the Gaussians up to this one.
 @fragment
 fn fs_sum(vertex: Vertex) -> @location(0) vec4f {
     let pixel = vec2i(vertex.position.xy);
@@ -466,31 +492,13 @@ fn fs_sum(vertex: Vertex) -> @location(0) vec4f {
     if here.profile == 0u {
         return vec4f(0.0);
     }
-    var before = vec3f(0.0);
-    if vertex.gaussian > 0u {
-        before = textureLoad(sum, pixel, 0).rgb;
-    }
-    let m = metric(pixel, here);
     let g = gaussian(here, vertex.gaussian);
-    if all(g.rgb == vec3f(0.0)) {
-        return vec4f(before, 1.0);
+    var total = vec4f(0.0);
+    // A profile of fewer Gaussians than another has some of no weight.
+    if any(g.rgb != vec3f(0.0)) {
+        total = front_sum(pixel, here, metric(pixel, here), g);
     }
-    let reach = reach(m.spacing, g.w);
-    var total: vec4f;
-    let l = m.lattice;
-    // Without area there is no lattice: but for no variance at all, what is endless is not small.
-    let inverse = vec3f(l.z, -l.y, l.x) / max(l.x * l.z - l.y * l.y, 1e-24);
-    let steps = along_steps(g.w * inverse);
-    if all(steps.rho <= vec3f(SMALL)) && all(steps.rho > vec3f(-1e-3)) {
-        total = small(pixel, here, l, steps);
-    } else {
-        total = sheared_rows(pixel, here, m, reach, g.w, max(g.r, max(g.g, g.b)));
-    }
-    if total.a <= 0.0 {
-        // No area to speak of: nothing to share with.
-        return vec4f(before + g.rgb * own_light(pixel), 1.0);
-    }
-    return vec4f(before + g.rgb * total.rgb / total.a, 1.0);
+    return with_gaussian(vertex, g, total);
 }
 
 // The sum at a pixel of the surface, as much of it as the pixel takes; its light bit for bit where that

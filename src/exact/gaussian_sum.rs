@@ -1,5 +1,6 @@
 //! The sum of Gaussians over a surface that is given by a position per pixel: what the exact effect and
-//! texture space share. Drives `shaders/exact/gaussian_sum.wgsl`.
+//! texture space share, and over a second one behind it. Drives `shaders/exact/gaussian_sum.wgsl` and
+//! `back_layer.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{UVec2, Vec4};
@@ -17,8 +18,17 @@ use crate::{MAX_PROFILES, Output, Profile};
 pub(crate) const SCRATCH: TextureFormat = TextureFormat::Rgba32Float;
 
 pub(crate) const SHADER: &str = include_str!("../../shaders/exact/gaussian_sum.wgsl");
+const BACK_LAYER: &str = include_str!("../../shaders/exact/back_layer.wgsl");
 
-/// Bindings of the shader.
+/// Side of the blocks that tell where a back layer is.
+const BLOCK: u32 = 8;
+
+/// Columns and rows of blocks of a surface of this size.
+pub(super) fn blocks(size: [u32; 2]) -> [u32; 2] {
+    size.map(|s| s.div_ceil(BLOCK))
+}
+
+/// Bindings of the shaders.
 const SETTINGS: u32 = 0;
 const POSITIONS: u32 = 1;
 const IRRADIANCE: u32 = 2;
@@ -27,6 +37,9 @@ const ROWS: u32 = 4;
 const SUM: u32 = 5;
 const STRENGTH: u32 = 6;
 const ALBEDO: u32 = 7;
+const BACK_POSITIONS: u32 = 8;
+const BACK_SOURCE: u32 = 9;
+const BLOCKS: u32 = 10;
 
 /// `Settings` of the shader.
 #[repr(C)]
@@ -69,6 +82,15 @@ pub(crate) struct GaussianSum {
     rows: Pass,
     sum: Pass,
     resolve: Pass,
+    /// `None` where no surface has a layer behind it.
+    layers: Option<Layers>,
+}
+
+/// The passes of a back layer, besides that of its source.
+#[derive(Debug)]
+struct Layers {
+    blocks: Pass,
+    sum: Pass,
 }
 
 #[derive(Debug)]
@@ -87,7 +109,15 @@ pub(crate) struct Sums {
     source: TextureView,
     rows: TextureView,
     sums: [TextureView; 2],
+    back: Option<BackScratch>,
     groups: Option<Groups>,
+}
+
+/// What a back layer takes on top.
+#[derive(Debug)]
+struct BackScratch {
+    source: TextureView,
+    blocks: TextureView,
 }
 
 #[derive(Debug)]
@@ -95,6 +125,8 @@ struct Groups {
     read: Textures,
     source: BindGroup,
     rows: BindGroup,
+    /// Of a back layer, the groups of its source and of its blocks.
+    back: Option<[BindGroup; 2]>,
     /// Reads the one sum, writes the other.
     sums: [BindGroup; 2],
     /// Of either sum.
@@ -132,11 +164,14 @@ pub(crate) struct Textures {
     /// The irradiance where there is none; it is not looked at then.
     pub strength: TextureView,
     pub albedo: TextureView,
+    /// Positions and irradiance of the surface behind.
+    pub back: Option<[TextureView; 2]>,
 }
 
 impl GaussianSum {
-    pub(crate) fn new(device: &Device, output: Output, label: &'static str) -> Self {
-        let module = gpu::module(device, label, &[SHADER]);
+    /// `has_layers`: whether frames may have a back layer.
+    pub(crate) fn new(device: &Device, output: Output, label: &'static str, has_layers: bool) -> Self {
+        let module = gpu::module(device, label, &[SHADER, BACK_LAYER]);
         let pass = |fragment: &str, textures: &[u32], target: ColorTargetState| {
             let label = format!("{label} {fragment}");
             let mut bindings = vec![(SETTINGS, gpu::UNIFORM)];
@@ -161,6 +196,14 @@ impl GaussianSum {
             Output::AddDifference(_) => "fs_difference",
         };
         let sums = [POSITIONS, IRRADIANCE, SOURCE, ROWS, SUM];
+        let layers = || Layers {
+            blocks: pass("fs_blocks", &[POSITIONS], SCRATCH.into()),
+            sum: pass(
+                "fs_sum_layers",
+                &[&sums[..], &[BACK_POSITIONS, BACK_SOURCE, BLOCKS]].concat(),
+                SCRATCH.into(),
+            ),
+        };
         Self {
             label,
             output,
@@ -172,6 +215,7 @@ impl GaussianSum {
                 &[POSITIONS, IRRADIANCE, SUM, STRENGTH, ALBEDO],
                 output.target(ColorWrites::ALL),
             ),
+            layers: has_layers.then(layers),
         }
     }
 
@@ -185,7 +229,18 @@ impl GaussianSum {
             source: view("source"),
             rows: view("rows"),
             sums: [view("sum 0"), view("sum 1")],
+            back: None,
             groups: None,
+        }
+    }
+
+    fn back_scratch(&self, device: &Device, size: [u32; 2]) -> BackScratch {
+        let view = |name: &str, size| {
+            gpu::scratch_texture(device, &format!("{} {name}", self.label), size, SCRATCH)
+        };
+        BackScratch {
+            source: view("source of the back", size),
+            blocks: view("blocks of the back", blocks(size)),
         }
     }
 
@@ -197,22 +252,32 @@ impl GaussianSum {
                 groups.gaussians = inputs.gaussians;
                 groups.viewport = inputs.viewport;
             }
-            _ => sums.groups = Some(self.bind(device, sums, inputs)),
+            _ => {
+                sums.back = match (sums.back.take(), &inputs.textures.back) {
+                    (made, Some(_)) => made.or_else(|| Some(self.back_scratch(device, sums.size))),
+                    (_, None) => None,
+                };
+                sums.groups = Some(self.bind(device, sums, inputs));
+            }
         }
     }
 
     fn bind(&self, device: &Device, sums: &Sums, inputs: Inputs) -> Groups {
         let read = inputs.textures;
-        let group = |pass: &Pass, sum: usize| {
+        let back = read.back.as_ref().zip(sums.back.as_ref());
+        let group_over = |pass: &Pass, positions, irradiance, sum: usize| {
             let texture = |binding: &u32| {
-                let view = match *binding {
-                    POSITIONS => &read.positions,
-                    IRRADIANCE => &read.irradiance,
-                    SOURCE => &sums.source,
-                    ROWS => &sums.rows,
-                    STRENGTH => &read.strength,
-                    ALBEDO => &read.albedo,
-                    _ => &sums.sums[sum],
+                let view = match (*binding, back) {
+                    (IRRADIANCE, _) => irradiance,
+                    (SOURCE, _) => &sums.source,
+                    (ROWS, _) => &sums.rows,
+                    (SUM, _) => &sums.sums[sum],
+                    (STRENGTH, _) => &read.strength,
+                    (ALBEDO, _) => &read.albedo,
+                    (BACK_POSITIONS, Some(([positions, _], _))) => positions,
+                    (BACK_SOURCE, Some((_, back))) => &back.source,
+                    (BLOCKS, Some((_, back))) => &back.blocks,
+                    _ => positions,
                 };
                 (*binding, BindingResource::TextureView(view))
             };
@@ -220,10 +285,16 @@ impl GaussianSum {
             resources.extend(pass.textures.iter().map(texture));
             gpu::group(device, self.label, &pass.layout, &resources)
         };
+        let group = |pass, sum| group_over(pass, &read.positions, &read.irradiance, sum);
+        let layers = self.layers.as_ref().zip(read.back.as_ref());
+        let sum = layers.map_or(&self.sum, |(layers, _)| &layers.sum);
         Groups {
             source: group(&self.source, 0),
             rows: group(&self.rows, 0),
-            sums: [group(&self.sum, 0), group(&self.sum, 1)],
+            back: layers.map(|(layers, [positions, irradiance])| {
+                [&self.source, &layers.blocks].map(|pass| group_over(pass, positions, irradiance, 0))
+            }),
+            sums: [group(sum, 0), group(sum, 1)],
             resolve: [group(&self.resolve, 0), group(&self.resolve, 1)],
             read,
             gaussians: inputs.gaussians,
@@ -243,12 +314,19 @@ impl GaussianSum {
             recording.draw(0..3, instance..instance + 1);
         };
         draw("source", &self.source, &groups.source, &sums.source, 0);
+        let mut sum = &self.sum;
+        if let (Some(layers), Some(back), Some([source, blocks])) = (&self.layers, &sums.back, &groups.back)
+        {
+            draw("source of the back", &self.source, source, &back.source, 0);
+            draw("blocks of the back", &layers.blocks, blocks, &back.blocks, 0);
+            sum = &layers.sum;
+        }
         for i in 0..groups.gaussians {
             let from = i as usize % 2;
             let (group, to) = (&groups.sums[from], &sums.sums[1 - from]);
             let along = |what| format!("Gaussian {} along {what}", i + 1);
             draw(&along("rows"), &self.rows, &groups.rows, &sums.rows, i);
-            draw(&along("columns"), &self.sum, group, to, i);
+            draw(&along("columns"), sum, group, to, i);
         }
         let keeps = self.output.adds() || groups.viewport.is_some();
         let mut pass = recorder.draw(&format!("{} resolve", self.label), &[output], keeps);
@@ -280,8 +358,10 @@ mod tests {
 
     #[test]
     fn constants_are_those_of_the_shader() {
-        let slots = crate::wgsl::constant(SHADER, "MAX_GAUSSIANS");
+        let shader = [SHADER, BACK_LAYER].concat();
+        let slots = crate::wgsl::constant(&shader, "MAX_GAUSSIANS");
         assert_eq!(slots as usize, Profile::MAX_GAUSSIANS);
+        assert_eq!(crate::wgsl::constant(&shader, "BLOCK") as u32, BLOCK);
     }
 
     #[test]

@@ -15,8 +15,16 @@ use crate::optics::Optics;
 use crate::{Frame, Output, Profile};
 use gaussian_sum::{GaussianSum, Inputs, SCRATCH, Sums, Textures};
 
-/// Bytes a pixel: positions, and what [`GaussianSum`] takes.
-pub(crate) const BYTES_PER_PIXEL: u64 = 80;
+/// Bytes of positions, and of what [`GaussianSum`] takes: source, rows and two sums.
+pub(crate) fn scratch_bytes([width, height]: [u32; 2]) -> u64 {
+    5 * 16 * u64::from(width) * u64::from(height)
+}
+
+/// What a back layer takes on top: positions, source, and where its blocks are.
+pub(crate) fn back_scratch_bytes(size: [u32; 2]) -> u64 {
+    let count = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height);
+    16 * (2 * count(size) + count(gaussian_sum::blocks(size)))
+}
 
 const LABEL: &str = "subsurface::exact";
 const SHADER: &str = include_str!("../../shaders/exact/positions.wgsl");
@@ -46,10 +54,17 @@ pub(crate) struct Exact {
 /// What one view needs.
 #[derive(Debug)]
 pub(crate) struct ExactView {
+    front: Surface,
+    back: Option<Surface>,
+    sums: Sums,
+}
+
+/// One layer of a frame, turned into positions.
+#[derive(Debug)]
+struct Surface {
     settings: Buffer,
     positions: TextureView,
     bound: Option<Bound>,
-    sums: Sums,
 }
 
 #[derive(Debug)]
@@ -57,6 +72,16 @@ struct Bound {
     depth: TextureView,
     profile_id: TextureView,
     group: BindGroup,
+}
+
+impl Surface {
+    fn new(device: &Device, size: [u32; 2]) -> Self {
+        Self {
+            settings: gpu::uniform_buffer::<Settings>(device, "subsurface::exact settings"),
+            positions: gpu::scratch_texture(device, "subsurface::exact positions", size, SCRATCH),
+            bound: None,
+        }
+    }
 }
 
 impl Exact {
@@ -79,7 +104,7 @@ impl Exact {
             layout,
             positions,
             no_id: gpu::scratch_texture(device, label, [1, 1], TextureFormat::R8Uint),
-            sum: GaussianSum::new(device, output, LABEL),
+            sum: GaussianSum::new(device, output, LABEL, true),
         }
     }
 
@@ -98,40 +123,27 @@ impl Exact {
             *view = None; // The old scratch goes before the new one comes.
         }
         let view = view.get_or_insert_with(|| ExactView {
-            settings: gpu::uniform_buffer::<Settings>(device, "subsurface::exact settings"),
-            positions: gpu::scratch_texture(device, "subsurface::exact positions", size, SCRATCH),
-            bound: None,
+            front: Surface::new(device, size),
+            back: None,
             sums: self.sum.sums(device, size),
         });
-        let settings = Settings {
-            inverse_projection: optics.inverse_projection,
-            first_pixel: frame.rectangle().first(),
-            size: UVec2::from(size).as_vec2(),
-            far: optics.far,
-            has_id: u32::from(frame.profile_id.is_some()),
-            pad: [0; 2],
-        };
-        queue.write_buffer(&view.settings, 0, bytemuck::bytes_of(&settings));
-        let profile_id = frame.profile_id.unwrap_or(&self.no_id);
-        let is_bound =
-            view.bound.as_ref().is_some_and(|b| b.depth == *frame.depth && b.profile_id == *profile_id);
-        if !is_bound {
-            let resources = [
-                (0, view.settings.as_entire_binding()),
-                (1, BindingResource::TextureView(frame.depth)),
-                (2, BindingResource::TextureView(profile_id)),
-            ];
-            view.bound = Some(Bound {
-                depth: frame.depth.clone(),
-                profile_id: profile_id.clone(),
-                group: gpu::group(device, LABEL, &self.layout, &resources),
-            });
+        let front = (frame.depth, frame.profile_id);
+        self.prepare_surface(device, queue, &mut view.front, frame, optics, front);
+        match frame.back {
+            Some(back) => {
+                let surface = view.back.get_or_insert_with(|| Surface::new(device, size));
+                let layer = (back.depth, back.profile_id.or(frame.profile_id));
+                self.prepare_surface(device, queue, surface, frame, optics, layer);
+            }
+            None => view.back = None,
         }
+        let back = frame.back.zip(view.back.as_ref());
         let textures = Textures {
-            positions: view.positions.clone(),
+            positions: view.front.positions.clone(),
             irradiance: frame.irradiance.clone(),
             strength: frame.strength.unwrap_or(frame.irradiance).clone(),
             albedo: frame.albedo.unwrap_or(frame.irradiance).clone(),
+            back: back.map(|(back, surface)| [surface.positions.clone(), back.irradiance.clone()]),
         };
         let settings = gaussian_sum::Settings {
             spacing: optics.spacing(),
@@ -144,15 +156,54 @@ impl Exact {
         self.sum.prepare(device, queue, &mut view.sums, inputs);
     }
 
+    /// Uploads the numbers of a layer, and binds its textures where they are others than before.
+    fn prepare_surface(
+        &self,
+        device: &Device,
+        queue: &Queue,
+        surface: &mut Surface,
+        frame: &Frame,
+        optics: &Optics,
+        layer: (&TextureView, Option<&TextureView>),
+    ) {
+        let (depth, profile_id) = layer;
+        let settings = Settings {
+            inverse_projection: optics.inverse_projection,
+            first_pixel: frame.rectangle().first(),
+            size: UVec2::from(frame.rectangle().size()).as_vec2(),
+            far: optics.far,
+            has_id: u32::from(profile_id.is_some()),
+            pad: [0; 2],
+        };
+        queue.write_buffer(&surface.settings, 0, bytemuck::bytes_of(&settings));
+        let profile_id = profile_id.unwrap_or(&self.no_id);
+        let is_bound = |b: &Bound| b.depth == *depth && b.profile_id == *profile_id;
+        if !surface.bound.as_ref().is_some_and(is_bound) {
+            let resources = [
+                (0, surface.settings.as_entire_binding()),
+                (1, BindingResource::TextureView(depth)),
+                (2, BindingResource::TextureView(profile_id)),
+            ];
+            surface.bound = Some(Bound {
+                depth: depth.clone(),
+                profile_id: profile_id.clone(),
+                group: gpu::group(device, LABEL, &self.layout, &resources),
+            });
+        }
+    }
+
     /// Records the frame that was last prepared.
     pub(crate) fn render(&self, recorder: &mut Recorder, view: &ExactView, output: &TextureView) {
-        let Some(bound) = &view.bound else { return };
-        let label = "subsurface::exact positions";
-        let mut pass = recorder.draw(label, &[&view.positions], false);
-        pass.set_pipeline(&self.positions);
-        pass.set_bind_group(0, &bound.group, &[]);
-        pass.draw(0..3, 0..1);
-        drop(pass);
+        let layers = [("positions", Some(&view.front)), ("positions of the back", view.back.as_ref())];
+        for (name, surface) in layers {
+            let Some((surface, bound)) = surface.and_then(|s| Some((s, s.bound.as_ref()?))) else {
+                continue;
+            };
+            let mut pass = recorder.draw(&format!("{LABEL} {name}"), &[&surface.positions], false);
+            pass.set_pipeline(&self.positions);
+            pass.set_bind_group(0, &bound.group, &[]);
+            pass.draw(0..3, 0..1);
+        }
         self.sum.render(recorder, &view.sums, output);
     }
 }

@@ -4,8 +4,8 @@
 use std::sync::OnceLock;
 
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
-use subsurface::wgpu::TextureFormat;
-use subsurface::{Frame, Plan, Profile};
+use subsurface::wgpu::{TextureFormat, TextureView};
+use subsurface::{BackLayer, Frame, Plan, Profile};
 
 use crate::method::{self, Ours};
 
@@ -155,8 +155,38 @@ impl GBuffer {
 
     /// What an effect makes of the frame, after `change`.
     pub fn scatter_by(&self, ours: &mut Ours, change: impl FnOnce(&mut Frame)) -> Vec<[f32; 4]> {
+        self.scatter_over(None, ours, change)
+    }
+
+    /// The same with a layer behind it.
+    pub fn scatter_over(
+        &self,
+        back: Option<&Self>,
+        ours: &mut Ours,
+        change: impl FnOnce(&mut Frame),
+    ) -> Vec<[f32; 4]> {
         let gpu = gpu();
         let size = self.view.size;
+        let [irradiance, depth, id] = self.upload();
+        let back = back.map(Self::upload);
+        let projection = self.view.projection.as_mat4().to_cols_array_2d();
+        let mut frame = Frame::new(&irradiance, &depth, projection);
+        frame.profile_id = Some(&id);
+        frame.mm_per_unit = 1.0;
+        frame.back = back.as_ref().map(|[irradiance, depth, id]| BackLayer {
+            irradiance,
+            depth,
+            profile_id: Some(id),
+        });
+        change(&mut frame);
+        let output = gpu.target("output", size, ours.effect.output().format());
+        method::scatter(gpu, ours, &frame, &output).expect("a frame that fits");
+        gpu.read(&output)
+    }
+
+    /// Irradiance, depth and profile id.
+    fn upload(&self) -> [TextureView; 3] {
+        let (gpu, size) = (gpu(), self.view.size);
         let mut irradiance = Vec::new();
         let mut depth = Vec::new();
         let mut id = Vec::new();
@@ -169,50 +199,55 @@ impl GBuffer {
             }));
             id.push(hit.map_or(0, |h| h.id as u8));
         }
-        let full = TextureFormat::Rgba32Float;
-        let irradiance = gpu.upload("irradiance", size, full, &irradiance);
-        let depth = gpu.upload("depth", size, TextureFormat::R32Float, &depth);
-        let id = gpu.upload("profile id", size, TextureFormat::R8Uint, &id);
-        let projection = self.view.projection.as_mat4().to_cols_array_2d();
-        let mut frame = Frame::new(&irradiance, &depth, projection);
-        frame.profile_id = Some(&id);
-        frame.mm_per_unit = 1.0;
-        change(&mut frame);
-        let output = gpu.target("output", size, ours.effect.output().format());
-        method::scatter(gpu, ours, &frame, &output).expect("a frame that fits");
-        gpu.read(&output)
+        [
+            gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &irradiance),
+            gpu.upload("depth", size, TextureFormat::R32Float, &depth),
+            gpu.upload("profile id", size, TextureFormat::R8Uint, &id),
+        ]
     }
 
     /// The visible integral at some pixels, all of which have the id 1.
     pub fn visible_integral(&self, asked: &[usize], profile: &Profile) -> Vec<DVec3> {
+        self.integral_over(None, asked, profile)
+    }
+
+    /// The same over this layer and one behind it.
+    pub fn integral_over(&self, back: Option<&Self>, asked: &[usize], profile: &Profile) -> Vec<DVec3> {
         let on_surface = self.pixels(|h| h.id == 1);
-        let pixels: Vec<Pixel> = on_surface
-            .iter()
-            .map(|(i, hit)| Pixel {
-                patch: Patch {
-                    // From what is looked at, which leaves single floats their digits.
-                    point_mm: (hit.point - on_surface[0].1.point).as_vec3(),
-                    area_mm2: self.steps[*i][0].cross(self.steps[*i][1]).length() as f32,
-                    irradiance: hit.irradiance.as_vec3(),
-                },
-                steps_mm: truth::even_steps(
-                    self.steps[*i].map(|step| step.as_vec3()),
-                    self.pixels_mm2[*i].sqrt() as f32,
-                    |x, y| {
-                        let [width, height] = self.view.size.map(|s| s as i32);
-                        let (x, y) = (*i as i32 % width + x, *i as i32 / width + y);
-                        let is_inside = (0..width).contains(&x) && (0..height).contains(&y);
-                        let found = is_inside.then(|| self.hits[(y * width + x) as usize]);
-                        let found = found.flatten().filter(|h| h.id == 1)?;
-                        Some((found.point - hit.point).as_vec3())
-                    },
-                ),
-            })
-            .collect();
+        // From what is looked at, which leaves single floats their digits.
+        let origin = on_surface[0].1.point;
+        let mut pixels = self.patches(&on_surface, origin);
+        if let Some(back) = back {
+            pixels.extend(back.patches(&back.pixels(|h| h.id == 1), origin));
+        }
         let place = |i| on_surface.partition_point(|(j, _)| j < i);
         let asked: Vec<usize> = asked.iter().map(place).collect();
         let sums = truth::visible_integral(&pixels, &asked, profile, &|_| ());
         sums.iter().map(|s| s.as_dvec3()).collect()
+    }
+
+    /// What the truth takes of these pixels, relative to a point.
+    fn patches(&self, on_surface: &[(usize, Hit)], origin: DVec3) -> Vec<Pixel> {
+        let pixels = on_surface.iter().map(|(i, hit)| Pixel {
+            patch: Patch {
+                point_mm: (hit.point - origin).as_vec3(),
+                area_mm2: self.steps[*i][0].cross(self.steps[*i][1]).length() as f32,
+                irradiance: hit.irradiance.as_vec3(),
+            },
+            steps_mm: truth::even_steps(
+                self.steps[*i].map(|step| step.as_vec3()),
+                self.pixels_mm2[*i].sqrt() as f32,
+                |x, y| {
+                    let [width, height] = self.view.size.map(|s| s as i32);
+                    let (x, y) = (*i as i32 % width + x, *i as i32 / width + y);
+                    let is_inside = (0..width).contains(&x) && (0..height).contains(&y);
+                    let found = is_inside.then(|| self.hits[(y * width + x) as usize]);
+                    let found = found.flatten().filter(|h| h.id == 1)?;
+                    Some((found.point - hit.point).as_vec3())
+                },
+            ),
+        });
+        pixels.collect()
     }
 
     /// Differences of `out`, the whole picture scattered by skin, to the visible integral.
@@ -246,13 +281,31 @@ pub fn sphere(
     distance_mm: f64,
     irradiance: impl Fn(DVec3) -> DVec3,
 ) -> impl Fn(DVec3, DVec3) -> Option<Hit> {
+    side_of_sphere(-1.0, rho_mm, distance_mm, irradiance)
+}
+
+/// Its far side.
+pub fn sphere_back(
+    rho_mm: f64,
+    distance_mm: f64,
+    irradiance: impl Fn(DVec3) -> DVec3,
+) -> impl Fn(DVec3, DVec3) -> Option<Hit> {
+    side_of_sphere(1.0, rho_mm, distance_mm, irradiance)
+}
+
+fn side_of_sphere(
+    side: f64,
+    rho_mm: f64,
+    distance_mm: f64,
+    irradiance: impl Fn(DVec3) -> DVec3,
+) -> impl Fn(DVec3, DVec3) -> Option<Hit> {
     move |origin, ray| {
         let center = DVec3::new(0.0, 0.0, -distance_mm);
         let (d, o) = (ray.normalize(), origin - center);
         let b = o.dot(d);
         let disc = b * b - o.length_squared() + rho_mm * rho_mm;
         (disc >= 0.0).then(|| {
-            let normal = (o + d * (-b - disc.sqrt())) / rho_mm;
+            let normal = (o + d * (-b + side * disc.sqrt())) / rho_mm;
             Hit { point: center + normal * rho_mm, normal, irradiance: irradiance(normal), id: 1 }
         })
     }

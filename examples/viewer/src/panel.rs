@@ -1,6 +1,7 @@
 //! The panel beside the picture.
 
 use egui::{Button, ComboBox, Grid, RichText, ScrollArea, Slider, Ui};
+use subsurface_lab::renderer::Lighting;
 
 use crate::layer::{Layer, Mode};
 use crate::passes::Pass;
@@ -41,6 +42,12 @@ fn modes(ui: &mut Ui, viewer: &mut Viewer) {
         }
     }
     ui.checkbox(&mut controls.half_resolution, "half resolution (H)");
+    ui.horizontal(|ui| {
+        ui.checkbox(&mut controls.has_back, "the layer behind (B)");
+        if ui.button("light from behind").clicked() {
+            controls.lighting.lights = Lighting::behind().lights;
+        }
+    });
     ui.horizontal(|ui| {
         if ui.button("reset view (R)").clicked() {
             viewer.reset();

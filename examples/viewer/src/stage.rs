@@ -15,7 +15,7 @@ use subsurface_lab::Error;
 use subsurface_lab::method::Ours;
 use subsurface_lab::metrics;
 use subsurface_lab::renderer::{
-    AtlasRenderer, Camera, Gpu, Layer as Shown, Lighting, Renderer, Scene, Timestamps,
+    AtlasRenderer, BackRenderer, Camera, Gpu, Layer as Shown, Lighting, Renderer, Scene, Timestamps,
 };
 
 use crate::layer::Layer;
@@ -32,6 +32,8 @@ pub struct Look {
     pub size: [u32; 2],
     pub camera: Camera,
     pub lighting: Lighting,
+    /// Screen space is handed the surface behind the visible one, too.
+    pub has_back: bool,
     pub profile: Profile,
     /// None: the first is still being fitted. It may be of another profile, while the next is.
     pub plan: Option<Arc<Plan>>,
@@ -175,6 +177,8 @@ struct Set {
     outputs: HashMap<Layer, TextureView>,
     /// Made when it is first asked for.
     atlas: Option<AtlasRenderer>,
+    /// Made when it is first asked for.
+    back: Option<BackRenderer>,
     view: View,
 }
 
@@ -182,6 +186,7 @@ struct Set {
 struct View {
     camera: Camera,
     lighting: Lighting,
+    has_back: bool,
     profile: Profile,
     plan: Option<Arc<Plan>>,
     draw_ms: f64,
@@ -215,6 +220,7 @@ impl View {
         Ok(Self {
             camera,
             lighting,
+            has_back: false,
             profile: look.profile,
             plan: look.plan.clone(),
             draw_ms: ms(since),
@@ -234,6 +240,7 @@ impl Set {
             renderer,
             outputs: HashMap::new(),
             atlas: None,
+            back: None,
         })
     }
 
@@ -242,6 +249,15 @@ impl Set {
         let view = &mut self.view;
         if view.camera != look.camera || view.lighting != look.lighting {
             *view = View::new(stage, &self.renderer, look)?;
+        }
+        if view.has_back != look.has_back {
+            view.shots.retain(|layer, _| !matches!(layer, Layer::Screen | Layer::Exact));
+            view.errors.clear();
+            view.has_back = look.has_back;
+            if look.has_back {
+                let make = || BackRenderer::new(&stage.gpu, &self.renderer);
+                self.back.get_or_insert_with(make).render(&stage.gpu, &self.renderer);
+            }
         }
         if view.profile != look.profile {
             // The plan brings its own.
@@ -382,7 +398,8 @@ impl Set {
                     ours.effect = ScreenSpace::new(&gpu.device, format, &plan)?;
                 }
                 let projection = look.camera.projection(self.size);
-                let frame = renderer.gbuffer.frame(projection, stage.mm_per_unit);
+                let mut frame = renderer.gbuffer.frame(projection, stage.mm_per_unit);
+                frame.back = self.back.as_ref().filter(|_| look.has_back).map(BackRenderer::layer);
                 let Ours { effect, view } = ours;
                 view.prepare(&gpu.device, &gpu.queue, effect, &frame)?;
                 let times = effects.timestamps.as_ref().zip(passes);

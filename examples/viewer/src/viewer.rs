@@ -35,6 +35,8 @@ pub struct Controls {
     pub profile_scale: f32,
     pub half_resolution: bool,
     pub lighting: Lighting,
+    /// Whether screen space is handed the surface behind the visible one.
+    pub has_back: bool,
     pub orbit: Orbit,
 }
 
@@ -79,6 +81,7 @@ impl Viewer {
             profile_scale: 1.0,
             half_resolution: false,
             lighting: Lighting::default(),
+            has_back: false,
             orbit,
         };
         Self {
@@ -168,6 +171,7 @@ impl Viewer {
             size,
             camera: self.controls.orbit.camera(),
             lighting: self.controls.lighting.clone(),
+            has_back: self.controls.has_back,
             profile,
             plan: self.planner.plan.clone(),
             layers: self.controls.mode.layers(self.controls.pair),
@@ -199,6 +203,7 @@ impl Viewer {
             }
         }
         self.controls.half_resolution ^= pressed(Key::H);
+        self.controls.has_back ^= pressed(Key::B);
         self.measure |= pressed(Key::M);
         self.time_passes |= pressed(Key::T);
         if pressed(Key::R) {

@@ -19,7 +19,7 @@ mod report;
 mod row;
 mod scene;
 mod score;
-mod truths;
+pub(crate) mod truths;
 
 use std::hash::{DefaultHasher, Hasher};
 use std::process::ExitCode;

@@ -9,9 +9,9 @@ use glam::Vec3;
 use indicatif::ProgressBar;
 use subsurface::Profile;
 
-use crate::chart::scene::{Head, Scene, Surface, vertices_mm};
+use crate::chart::scene::{Scene, Surface, vertices_mm};
 use crate::output;
-use crate::renderer::{Gpu, Probe, Scene as Model};
+use crate::renderer::{Camera, Gpu, Probe, Renderer, Scene as Model};
 use crate::truth::{Patch, Place, SurfaceIntegral, Triangles, surface_integral, visible_integral};
 
 /// Of each pixel that is asked for, on a regular grid; zero where nothing scatters.
@@ -118,7 +118,8 @@ impl Truths {
             }
             Surface::Head(head) => {
                 let patches: Vec<Patch> = asked.iter().map(|i| scene.pixels[*i].patch).collect();
-                let truth = eq7(gpu, model, head, scene.mm_per_unit, &patches, profile, 1.0, &progress);
+                let by = (&head.renderer, &head.camera);
+                let truth = eq7(gpu, model, by, scene.mm_per_unit, &patches, profile, 1.0, &progress);
                 (truth.printed, truth.normalised)
             }
         };
@@ -126,19 +127,19 @@ impl Truths {
     }
 }
 
-/// Eq. 7 over all of a model's skin, by the renderer's own lights.
+/// Eq. 7 over all of a model's skin, by the lights that a renderer last drew it with, for a camera.
 #[allow(clippy::too_many_arguments, reason = "each is a thing of its own")]
 pub fn eq7(
     gpu: &Gpu,
     model: &Model,
-    head: &Head,
+    (renderer, camera): (&Renderer, &Camera),
     mm_per_unit: f32,
     asked: &[Patch],
     profile: &Profile,
     density: f32,
     progress: &(dyn Fn(f64) + Sync),
 ) -> SurfaceIntegral {
-    let probe = Probe::new(gpu, &head.renderer);
+    let probe = Probe::new(gpu, renderer);
     let skin = model.primitives.iter().enumerate();
     let skin: Vec<_> = skin.filter(|(_, p)| model.materials[p.material].profile_id == 1).collect();
     // All primitives as one mesh, and the first triangle of each.
@@ -154,7 +155,7 @@ pub fn eq7(
         let runs = places.chunk_by(|a, b| owner(a) == owner(b)).flat_map(|run| {
             let owner = owner(&run[0]);
             let places: Vec<_> = run.iter().map(|p| (p.triangle - firsts[owner], p.barycentric)).collect();
-            probe.irradiance(gpu, &head.renderer, &head.camera, skin[owner], mm_per_unit, &places)
+            probe.irradiance(gpu, renderer, camera, skin[owner], mm_per_unit, &places)
         });
         Ok(runs.collect())
     };
@@ -214,7 +215,8 @@ mod tests {
             let asked: Vec<Patch> = scene.pixels.iter().map(|p| p.patch).collect();
             let of = |density| {
                 let none = |_| ();
-                eq7(&gpu, &model, head, 1000.0, &asked, &Profile::SKIN, density, &none)
+                let by = (&head.renderer, &head.camera);
+                eq7(&gpu, &model, by, 1000.0, &asked, &Profile::SKIN, density, &none)
             };
             let (whole, half) = (of(1.0), of(0.5));
             let worst = |a: &[Vec3], b: &[Vec3]| {

@@ -15,13 +15,15 @@ use crate::Error;
 use glam::{Mat4, Vec3, Vec4};
 use image::RgbImage;
 use indicatif::{ProgressBar, ProgressStyle};
-use subsurface::{Atlas, DEFAULT_MAX_ERROR, Plan, Profile, TextureSpace, wgpu};
+use subsurface::{Atlas, DEFAULT_MAX_ERROR, Frame, Plan, Profile, TextureSpace, wgpu};
 
+use crate::chart::truths::eq7;
 use crate::method::{self, Ours};
 use crate::metrics::{self, Layer};
 use crate::renderer::{
-    AtlasRenderer, Camera, Gpu, Layer as Shown, Lighting, Renderer, Scene, Specular, View,
+    AtlasRenderer, BackRenderer, Camera, Gpu, Layer as Shown, Lighting, Probe, Renderer, Scene, View,
 };
+use crate::truth::Patch;
 use crate::{output, srgb};
 use report::{DIFFERENCE_GAIN, ModeReport, Report};
 
@@ -32,6 +34,9 @@ const TIMED_SECONDS: f64 = 10.0;
 /// Gaussians narrower than this, in texels, are lost in an atlas.
 const RESOLVED_TEXELS: f32 = 0.6;
 
+/// The mode of the integral over the whole mesh.
+const EQ7: &str = "eq7";
+
 const HELP: &str = "\
 Renders a head without scattering, in texture space, and in screen space by a plan and by the exact sum.
 
@@ -39,7 +44,10 @@ Usage: cargo run --release --example compare -- [OPTIONS]
 
   --model FILE        a .glb or .gltf file                        [the built-in head]
   --size WxH          of the pictures, in pixels                  [512x512]
-  --view VIEW         front, three-quarter, profile or close-up   [front]
+  --view VIEW         front, three-quarter, profile, close-up, ear [front]
+  --light LIGHT       portrait, or behind the head                [portrait]
+  --back              hands in the layer behind, too; with behind [no]
+  --eq7               the integral over the whole mesh, too: minutes
   --look-at X,Y,Z     a point to look at, in scene units          [the face]
   --distance X        from that point, in mm                      [600]
   --turn X            of the camera about the head, in degrees    [0]
@@ -67,7 +75,10 @@ struct Options {
     profile: Profile,
     max_error: f32,
     mm_per_unit: f32,
-    specular: Specular,
+    lighting: Lighting,
+    /// Whether screen space is shown with the layer behind, too.
+    has_back: bool,
+    has_eq7: bool,
     texture_size: u32,
     exposure: f32,
     out: PathBuf,
@@ -99,7 +110,9 @@ fn options() -> Result<Option<Options>, Error> {
         profile: Profile::SKIN,
         max_error: DEFAULT_MAX_ERROR,
         mm_per_unit: 1000.0,
-        specular: Specular::Kelemen,
+        lighting: Lighting::default(),
+        has_back: false,
+        has_eq7: false,
         texture_size: 2048,
         exposure: 1.0,
         out: "out/compare".into(),
@@ -136,7 +149,13 @@ fn options() -> Result<Option<Options>, Error> {
             "skin" => options.skin[0] = names(&text()?),
             "not-skin" => options.skin[1] = names(&text()?),
             "profile" => options.profile = profile(&text()?)?,
-            "specular" => options.specular = text()?.parse()?,
+            "specular" => options.lighting.specular = text()?.parse()?,
+            "light" => {
+                let specular = options.lighting.specular;
+                options.lighting = Lighting { specular, ..light(&text()?)? };
+            }
+            "back" => options.has_back = true,
+            "eq7" => options.has_eq7 = true,
             "max-error" => options.max_error = max_error(&text()?)?,
             "mm-per-unit" => options.mm_per_unit = positive("--mm-per-unit", &text()?)?,
             "exposure" => options.exposure = positive("--exposure", &text()?)?,
@@ -158,6 +177,14 @@ fn size(text: &str) -> Result<[u32; 2], Error> {
     text.split_once('x')
         .and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]))
         .ok_or_else(|| Error::new("--size", text, "WIDTHxHEIGHT in pixels, such as 512x512"))
+}
+
+fn light(text: &str) -> Result<Lighting, Error> {
+    match text {
+        "portrait" => Ok(Lighting::default()),
+        "behind" => Ok(Lighting::behind()),
+        _ => Err(Error::new("--light", text, "portrait or behind")),
+    }
 }
 
 fn point(text: &str) -> Result<Vec3, Error> {
@@ -217,6 +244,8 @@ struct Shot {
     size: [u32; 2],
     renderer: Renderer,
     camera: Camera,
+    /// Where it is asked for.
+    back: Option<BackRenderer>,
     modes: Vec<Scattered>,
     /// Modes that cannot be had: title and reason.
     unavailable: Vec<(String, String)>,
@@ -241,14 +270,19 @@ fn compare(options: &Options) -> Result<(), Error> {
     let gpu = Gpu::headless()?;
 
     step("scattering");
-    let shot = Shot::new(&gpu, &scene, options, options.size, TIMED_RUNS)?;
+    let mut shot = Shot::new(&gpu, &scene, options, options.size, TIMED_RUNS)?;
+    if options.has_eq7 {
+        step("Eq. 7 over the whole mesh");
+        shot.add_eq7(&gpu, &scene, options, &progress);
+    }
 
     // What is measured is of pixels that have one sample each, as methods take them.
     step("scattering at twice the size, for smooth pictures");
     let twice = options.size.map(|s| s.saturating_mul(2));
+    // Eq. 7 would take four times as long.
     let fine = match gpu.check_size(twice) {
-        Ok(()) => Some(Shot::new(&gpu, &scene, options, twice, 1)?),
-        Err(_) => None,
+        Ok(()) if !options.has_eq7 => Some(Shot::new(&gpu, &scene, options, twice, 1)?),
+        _ => None,
     };
 
     step("measuring");
@@ -264,9 +298,10 @@ fn compare(options: &Options) -> Result<(), Error> {
          the modes with each other, not with a GPU.",
         runs.join(", ")
     )];
-    if fine.is_none() {
+    if fine.is_none() && !options.has_eq7 {
         notes.push("Pictures of this size are not anti-aliased: the device cannot render twice it.".into());
     }
+    notes.extend(measured.to_eq7);
     if finest < coarsest {
         notes.push(format!(
             "The primitives differ: {finest:.3} to {coarsest:.3} mm a texel; the coarsest is given."
@@ -301,6 +336,9 @@ fn compare(options: &Options) -> Result<(), Error> {
         .map_err(|e| Error::new("--out", format!("\"{e}\""), "a directory that can be written to"))?;
     progress.finish_and_clear();
     println!("{}", report::table(&report));
+    for note in &report.notes {
+        println!("{note}");
+    }
     println!("{} in {:.1} s", options.out.join("report.html").display(), started.elapsed().as_secs_f64());
     Ok(())
 }
@@ -320,8 +358,11 @@ impl Shot {
             None => Camera::framing(scene, options.view, size),
         }
         .turned(options.turn_degrees.to_radians());
-        let lighting = Lighting { specular: options.specular, ..Default::default() };
-        renderer.render(gpu, &camera, &lighting, options.mm_per_unit)?;
+        renderer.render(gpu, &camera, &options.lighting, options.mm_per_unit)?;
+        let back = options.has_back.then(|| BackRenderer::new(gpu, &renderer));
+        if let Some(back) = &back {
+            back.render(gpu, &renderer);
+        }
         let none = Scattered {
             name: "none",
             title: "no scattering".into(),
@@ -330,7 +371,7 @@ impl Shot {
             ms: 0.0,
             atlas_ms: None,
         };
-        let mut shot = Self { size, renderer, camera, modes: vec![none], unavailable: Vec::new() };
+        let mut shot = Self { size, renderer, camera, back, modes: vec![none], unavailable: Vec::new() };
         match shot.texture_space(gpu, options, most_runs) {
             Ok(mode) => shot.modes.push(mode),
             Err(error) => shot.unavailable.push(("texture space".into(), error.to_string())),
@@ -338,36 +379,55 @@ impl Shot {
         let title = format!("screen space, a plan at {}", fraction(options.max_error));
         match Plan::new(&[options.profile], options.max_error) {
             Ok(plan) => {
-                let mode = shot.screen_space(gpu, options, "screen_planned", title, &plan, most_runs)?;
-                shot.modes.push(mode);
+                let names = ["screen_planned", "screen_planned_back"];
+                shot.screen_space(gpu, options, names, &title, &plan, most_runs)?;
             }
             Err(error) => shot.unavailable.push((title, error.to_string())),
         }
         let exact = Plan::exact(&[options.profile])?;
-        let title = "screen space, the exact sum".into();
-        let mode = shot.screen_space(gpu, options, "screen_space", title, &exact, most_runs)?;
-        shot.modes.push(mode);
+        let names = ["screen_space", "screen_space_back"];
+        shot.screen_space(gpu, options, names, "screen space, the exact sum", &exact, most_runs)?;
         Ok(shot)
     }
 
+    /// Adds the modes of a plan: of what is seen, and with the layer behind where there is one.
     fn screen_space(
-        &self,
+        &mut self,
         gpu: &Gpu,
         options: &Options,
+        names: [&'static str; 2],
+        title: &str,
+        plan: &Plan,
+        most_runs: usize,
+    ) -> Result<(), Error> {
+        let projection = self.camera.projection(self.size);
+        let mut frame = self.renderer.gbuffer.frame(projection, options.mm_per_unit);
+        let mut modes = vec![self.scattered(gpu, names[0], title.into(), plan, &frame, most_runs)?];
+        if let Some(back) = &self.back {
+            frame.back = Some(back.layer());
+            let title = format!("{title}, two layers");
+            modes.push(self.scattered(gpu, names[1], title, plan, &frame, most_runs)?);
+        }
+        self.modes.extend(modes);
+        Ok(())
+    }
+
+    fn scattered(
+        &self,
+        gpu: &Gpu,
         name: &'static str,
         title: String,
         plan: &Plan,
+        frame: &Frame,
         most_runs: usize,
     ) -> Result<Scattered, Error> {
         let output = self.renderer.scattered_target(gpu);
-        let projection = self.camera.projection(self.size);
-        let frame = self.renderer.gbuffer.frame(projection, options.mm_per_unit);
         let mut ours = Ours::new(&gpu.device, output.texture().format(), plan)?;
         let mut times = Vec::new();
         let timed = Instant::now();
         while more_runs(times.len(), most_runs, timed) {
             let start = Instant::now();
-            method::scatter(gpu, &mut ours, &frame, &output)?;
+            method::scatter(gpu, &mut ours, frame, &output)?;
             times.push(start.elapsed().as_secs_f64() * 1e3);
         }
         Ok(Scattered {
@@ -378,6 +438,40 @@ impl Shot {
             ms: median(&mut times),
             atlas_ms: None,
         })
+    }
+
+    /// Adds Eq. 7 over all of the mesh, each Gaussian divided by its mass, as a mode.
+    fn add_eq7(&mut self, gpu: &Gpu, scene: &Scene, options: &Options, progress: &ProgressBar) {
+        let visible = Probe::new(gpu, &self.renderer).visible(gpu, &self.renderer);
+        let mut light = gpu.read(&self.renderer.gbuffer.irradiance);
+        let ids = gpu.read_bytes(self.renderer.gbuffer.profile_id.texture());
+        let skin: Vec<usize> = (0..ids.len()).filter(|i| ids[*i] == 1).collect();
+        let patch = |i: &usize| {
+            let irradiance = Vec4::from(light[*i]).truncate();
+            Patch { point_mm: visible[*i].point_mm, area_mm2: 0.0, irradiance }
+        };
+        let asked: Vec<Patch> = skin.iter().map(patch).collect();
+        let done = std::sync::Mutex::new(0.0);
+        let tell = |share: f64| {
+            if let Ok(mut done) = done.lock() {
+                *done += share;
+                progress.set_message(format!("Eq. 7 over the whole mesh: {:.0} %", 100.0 * *done));
+            }
+        };
+        let since = Instant::now();
+        let by = (&self.renderer, &self.camera);
+        let truth = eq7(gpu, scene, by, options.mm_per_unit, &asked, &options.profile, 1.0, &tell);
+        for (i, scattered) in skin.iter().zip(truth.normalised) {
+            light[*i] = scattered.extend(light[*i][3]).to_array();
+        }
+        self.modes.push(Scattered {
+            name: EQ7,
+            title: "Eq. 7 over the whole mesh".into(),
+            view: gpu.upload("Eq. 7", self.size, wgpu::TextureFormat::Rgba32Float, &light),
+            runs: 0,
+            ms: since.elapsed().as_secs_f64() * 1e3,
+            atlas_ms: None,
+        });
     }
 
     /// Fails only where the model has no UVs for it.
@@ -504,6 +598,8 @@ fn unresolved(mm_per_texel: &[(String, f32)], profile: &Profile) -> Vec<String> 
 
 struct Measured {
     reports: Vec<ModeReport>,
+    /// How far modes are from Eq. 7, in a sentence.
+    to_eq7: Option<String>,
     /// Name of the mode, scattered irradiance.
     layers: Vec<(&'static str, Layer)>,
 }
@@ -579,8 +675,18 @@ fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: 
             flip: flip.map(|(_, heat)| heat),
         });
     }
+    let truth = modes.iter().position(|m| m.name == EQ7);
+    let to_eq7 = truth.map(|truth| {
+        let others = modes.iter().zip(&irradiance).filter(|(m, _)| m.name != EQ7);
+        let errors = others.filter_map(|(mode, light)| {
+            let error = metrics::relative_rmse(light, &irradiance[truth], &inner)?;
+            Some(format!("{} {:.2} %", mode.title, 100.0 * error))
+        });
+        let errors: Vec<_> = errors.collect();
+        format!("Relative RMSE to Eq. 7 over the whole mesh: {}.", errors.join("; "))
+    });
     let names = modes.iter().map(|m| m.name);
-    Measured { reports, layers: names.zip(irradiance).collect() }
+    Measured { reports, to_eq7, layers: names.zip(irradiance).collect() }
 }
 
 fn files(report: &Report, layers: &[(&'static str, Layer)]) -> image::ImageResult<Vec<(String, Vec<u8>)>> {

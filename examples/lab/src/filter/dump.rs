@@ -41,6 +41,8 @@ struct Files {
     irradiance: Layers,
     depth: Layers,
     profile_id: Option<Layers>,
+    back_irradiance: Option<Layers>,
+    back_depth: Option<Layers>,
     #[serde(flatten)]
     unknown: Unknown,
 }
@@ -92,7 +94,7 @@ impl Camera {
         let path = case.join("gbuffer.json");
         let mut camera: Self = serde_json::from_str(&read_text(&path)?).map_err(|e| {
             let needs = "width, height, projection (16 numbers), mm_per_unit, and files: \
-                         irradiance, depth, optionally profile_id";
+                         irradiance, depth, optionally profile_id, back_irradiance and back_depth";
             Error::new(path.display(), format!("\"{e}\""), needs)
         })?;
         camera.case = case.to_owned();
@@ -121,7 +123,8 @@ impl Camera {
     pub fn unknown(&self) -> Vec<String> {
         let files = &self.files;
         let inputs = [&files.irradiance, &files.depth].into_iter();
-        let layers = inputs.chain(&files.profile_id).flat_map(|l| &l.0);
+        let inputs = inputs.chain(&files.profile_id).chain(&files.back_irradiance).chain(&files.back_depth);
+        let layers = inputs.flat_map(|l| &l.0);
         let inner = layers.flat_map(|l| l.unknown.keys());
         let inner = files.unknown.keys().chain(inner);
         let inner = inner.map(|key| format!("files: {key}"));
@@ -138,6 +141,52 @@ impl Camera {
         let path = self.case.join(&layer.file);
         let pixels = channels::read(&path, layer.layer.as_deref(), self.size(), one)?;
         Ok((path, pixels))
+    }
+
+    /// Reads an input of light.
+    fn light(&self, layers: &Layers) -> Result<Vec<[f32; 4]>, Error> {
+        let mut irradiance = Vec::new();
+        for layer in &layers.0 {
+            let (path, Pixels { rgb, .. }) = self.layer(layer, false)?;
+            irradiance.resize(rgb.len(), [0.0, 0.0, 0.0, 1.0]);
+            for (i, &light) in rgb.as_flattened().iter().enumerate() {
+                let sum = &mut irradiance[i / 3][i % 3];
+                *sum += light;
+                if !sum.is_finite() {
+                    return Err(self.bad_pixel(&path, i / 3, light, "finite light"));
+                }
+            }
+        }
+        Ok(irradiance)
+    }
+
+    /// Irradiance and depth of the back layer, where the files have one.
+    fn back(&self) -> Result<Option<BackLayer>, Error> {
+        let (light, depth) = match (&self.files.back_irradiance, &self.files.back_depth) {
+            (None, None) => return Ok(None),
+            (Some(light), Some(depth)) => (light, depth),
+            (light, _) => {
+                let [got, missing] = match light {
+                    Some(_) => ["back_irradiance", "back_depth"],
+                    None => ["back_depth", "back_irradiance"],
+                };
+                let needs = format!("{missing}, too");
+                return Err(self.error(Error::new("files", format!("{got} alone"), needs)));
+            }
+        };
+        let projection = self.projection();
+        let (path, distance, _) = self.one("back_depth", depth)?;
+        let mut depth = vec![far_depth(projection); distance.len()];
+        for (at, distance) in distance.into_iter().enumerate() {
+            if distance != 0.0 && distance < BACKGROUND {
+                let Some((written, _)) = write_depth(projection, distance) else {
+                    let needs = "a distance along -Z that has a depth by projection, or 0 where nothing is";
+                    return Err(self.bad_pixel(&path, at, distance, needs));
+                };
+                depth[at] = written;
+            }
+        }
+        Ok(Some(BackLayer { irradiance: self.light(light)?, depth }))
     }
 
     /// Reads an input of one channel; with its path, and whether it was in half floats.
@@ -165,6 +214,13 @@ impl Camera {
     }
 }
 
+/// A surface behind the visible one, as the effects take it.
+pub struct BackLayer {
+    pub irradiance: Vec<[f32; 4]>,
+    /// That of the far plane where nothing is.
+    pub depth: Vec<f32>,
+}
+
 /// A frame, as the effects take it.
 pub struct Dump {
     pub camera: Camera,
@@ -173,6 +229,8 @@ pub struct Dump {
     pub depth: Vec<f32>,
     /// 0 where nothing is.
     pub profile_id: Vec<u8>,
+    /// The surface right behind the visible one.
+    pub back: Option<BackLayer>,
     pub depth_is_half: bool,
     /// How far the rounding of `depth` to a float moves a surface that scatters, at most.
     pub depth_error_mm: f64,
@@ -185,18 +243,7 @@ impl Dump {
     /// The first pixel of the first file that cannot be used.
     pub fn read(camera: Camera, profiles: usize) -> Result<Self, Error> {
         let projection = camera.projection();
-        let mut irradiance = Vec::new();
-        for layer in &camera.files.irradiance.0 {
-            let (path, Pixels { rgb, .. }) = camera.layer(layer, false)?;
-            irradiance.resize(rgb.len(), [0.0, 0.0, 0.0, 1.0]);
-            for (i, &light) in rgb.as_flattened().iter().enumerate() {
-                let sum = &mut irradiance[i / 3][i % 3];
-                *sum += light;
-                if !sum.is_finite() {
-                    return Err(camera.bad_pixel(&path, i / 3, light, "finite light"));
-                }
-            }
-        }
+        let irradiance = camera.light(&camera.files.irradiance)?;
 
         let (depth_path, distance, depth_is_half) = camera.one("depth", &camera.files.depth)?;
         let has_ids = camera.files.profile_id.is_some();
@@ -212,10 +259,7 @@ impl Dump {
             }
         }
 
-        // Whether depth grows with the distance.
-        let Mat4 { z_axis, w_axis, .. } = projection;
-        let is_forward = z_axis.z * w_axis.w < w_axis.z * z_axis.w;
-        let mut depth = vec![if is_forward { 1.0 } else { 0.0 }; distance.len()];
+        let mut depth = vec![far_depth(projection); distance.len()];
         let mut depth_error_mm: f64 = 0.0;
         for (at, &distance) in distance.iter().enumerate() {
             let id = &mut profile_id[at];
@@ -232,15 +276,25 @@ impl Dump {
                 return Err(camera.bad_pixel(&depth_path, at, distance, needs));
             }
         }
-        Ok(Self { camera, irradiance, depth, profile_id, depth_is_half, depth_error_mm })
+        let back = camera.back()?;
+        Ok(Self { camera, irradiance, depth, profile_id, back, depth_is_half, depth_error_mm })
     }
 
-    /// The largest irradiance of a pixel that scatters.
+    /// The largest irradiance of a pixel that scatters, or of the back layer.
     pub fn brightest(&self) -> f32 {
         let pixels = self.irradiance.iter().zip(&self.profile_id);
         let skin = pixels.filter(|(_, id)| **id > 0).flat_map(|(e, _)| &e[..3]);
-        skin.copied().fold(0.0, f32::max)
+        let back = self.back.iter().flat_map(|back| &back.irradiance).flat_map(|e| &e[..3]);
+        skin.chain(back).copied().fold(0.0, f32::max)
     }
+}
+
+/// Where nothing is.
+fn far_depth(projection: Mat4) -> f32 {
+    // Whether depth grows with the distance.
+    let Mat4 { z_axis, w_axis, .. } = projection;
+    let is_forward = z_axis.z * w_axis.w < w_axis.z * z_axis.w;
+    if is_forward { 1.0 } else { 0.0 }
 }
 
 /// Depth of a surface at a distance along −Z, and by how much its rounding to a float moves the

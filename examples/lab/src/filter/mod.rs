@@ -20,7 +20,7 @@ use std::time::Instant;
 
 use image::{ImageFormat, ImageResult, Rgb, Rgb32FImage, RgbImage};
 use subsurface::wgpu::{self, TextureFormat};
-use subsurface::{Frame, Plan};
+use subsurface::{BackLayer, Frame, Plan};
 
 use crate::Error;
 use crate::method::{self, Ours};
@@ -122,6 +122,11 @@ fn scatter(gpu: &Gpu, dump: &Dump, plan: &Plan) -> Result<Vec<[f32; 3]>, Error> 
     let mut frame = Frame::new(&irradiance, &depth, projection);
     frame.profile_id = Some(&profile_id);
     frame.mm_per_unit = dump.camera.mm_per_unit;
+    let back = dump.back.as_ref().map(|back| {
+        let light = gpu.upload("back irradiance", size, format, &back.irradiance);
+        (light, gpu.upload("back depth", size, TextureFormat::R32Float, &back.depth))
+    });
+    frame.back = back.as_ref().map(|(irradiance, depth)| BackLayer { irradiance, depth, profile_id: None });
     let mut ours = Ours::new(device, format, plan)?;
     method::scatter(gpu, &mut ours, &frame, &output).map_err(|e| dump.camera.error(e))?;
     // Innermost first.

@@ -85,6 +85,25 @@ const APART_AT_MOST: f32 = 6e-4;
 const HALF_STEP: f32 = 1.0 / 1024.0;
 
 #[test]
+fn light_from_behind_comes_through_what_is_thin() {
+    let case = Case::plane("back");
+    case.write("light.exr", RGB, FLOATS, |_, _| 0.0);
+    case.write("back.exr", RGB, FLOATS, |_, _| 1.0);
+    case.edit("/files/back_irradiance", json!("back.exr"));
+    let error = case.run(EXACT).unwrap_err().to_string();
+    assert!(error.contains("back_irradiance alone") && error.contains("back_depth"), "{error}");
+    case.edit("/files/back_depth", json!("behind.exr"));
+    // Red passes the more the thinner it is: of a slab of no thickness half, of one beyond all reach nothing.
+    for (thickness, least, most) in [(1e-6, 0.49, 0.51), (0.0015, 0.05, 0.4), (0.1, 0.0, 0.0)] {
+        case.write("behind.exr", &["Z"], FLOATS, |_, _| 0.5 + thickness);
+        let out = case.run(EXACT).unwrap();
+        let red = out.iter().map(|p| p[0]);
+        let (low, high) = red.fold((f32::MAX, 0f32), |(low, high), r| (low.min(r), high.max(r)));
+        assert!(least <= low && high <= most, "{thickness}: {low} to {high}");
+    }
+}
+
+#[test]
 fn a_dump_scatters_as_the_frame_did() {
     let head = Head::new();
     let light = head.gpu.read(&head.renderer.gbuffer.irradiance);

@@ -34,6 +34,8 @@ pub enum View {
     Profile,
     /// The middle of the face.
     CloseUp,
+    /// The person's right ear, from before it.
+    Ear,
 }
 
 impl FromStr for View {
@@ -45,7 +47,8 @@ impl FromStr for View {
             "three-quarter" => Ok(Self::ThreeQuarter),
             "profile" => Ok(Self::Profile),
             "close-up" => Ok(Self::CloseUp),
-            _ => Err(Error::new("view", name, "front, three-quarter, profile or close-up")),
+            "ear" => Ok(Self::Ear),
+            _ => Err(Error::new("view", name, "front, three-quarter, profile, close-up or ear")),
         }
     }
 }
@@ -61,6 +64,7 @@ impl Camera {
         let middle = Vec3::new(0.5 * (min.x + max.x), max.y - 0.5 * head, 0.5 * (min.z + max.z));
         let (target, height) = match view {
             View::CloseUp => (face.nose(scene, min.y + 0.35 * extent.y), 0.26 * extent.y),
+            View::Ear => (face.ear(scene), 0.34 * extent.y),
             _ => (middle, head),
         };
         // Upright frames need the distance that the width asks for.
@@ -68,7 +72,7 @@ impl Camera {
         // Not quite to the edge, and from beyond the nearest point.
         let distance = 0.54 * height / (FOV_Y / 2.0).tan()
             + match view {
-                View::CloseUp => 0.0,
+                View::CloseUp | View::Ear => 0.0,
                 _ => 0.3 * extent.dot(face.forward.abs()),
             };
         Self::facing(face.forward, view, target, distance)
@@ -91,6 +95,7 @@ impl Camera {
             View::ThreeQuarter => -40.0,
             View::Profile => -90.0,
             View::CloseUp => 20.0,
+            View::Ear => -25.0,
         };
         let back = Quat::from_rotation_y(yaw.to_radians()) * forward;
         Self { eye: target + distance * back, target, fov_y: FOV_Y }

@@ -37,6 +37,17 @@ impl Head {
         Self { min, max, forward }
     }
 
+    /// The point furthest to the person's right: the rim of an ear.
+    pub fn ear(&self, scene: &Scene) -> Vec3 {
+        let right = self.forward.cross(Vec3::Y);
+        let here = |p: &Vec3| p.cmpge(self.min).all() && p.cmple(self.max).all();
+        // Shoulders are further out, and lower.
+        let above = 0.5 * (self.min.y + self.max.y);
+        let skin = points(scene.skin()).filter(here).filter(|p| p.y >= above);
+        let outermost = skin.max_by(|a, b| a.dot(right).total_cmp(&b.dot(right)));
+        outermost.unwrap_or(0.5 * (self.min + self.max))
+    }
+
     /// The foremost point above a height, near the middle: the tip of the nose.
     pub fn nose(&self, scene: &Scene, above_y: f32) -> Vec3 {
         let (size, middle) = (self.max - self.min, 0.5 * (self.min + self.max));

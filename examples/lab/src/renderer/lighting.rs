@@ -107,6 +107,18 @@ fn basis(d: Vec3) -> [f32; 9] {
     [1.0, d.y, d.z, d.x, d.x * d.y, d.y * d.z, 3.0 * d.z * d.z - 1.0, d.x * d.z, d.x * d.x - d.y * d.y]
 }
 
+impl Lighting {
+    /// Light from behind the head, on the side of its right ear, and a dim sky.
+    pub fn behind() -> Self {
+        let light = Light {
+            direction: Vec3::new(-0.45, 0.25, -0.86),
+            radius_degrees: 2.0,
+            color: Vec3::new(1.6, 1.5, 1.4),
+        };
+        Self { lights: vec![light], ..Self::default() }
+    }
+}
+
 impl Default for Lighting {
     /// A portrait: a warm key from the side, a cool rim from behind, a dim sky.
     fn default() -> Self {

@@ -8,6 +8,7 @@
 mod accessor;
 mod atlas;
 mod attributes;
+mod back;
 mod camera;
 mod gpu;
 mod head;
@@ -23,6 +24,7 @@ mod tangents;
 mod timestamps;
 
 pub use atlas::AtlasRenderer;
+pub use back::BackRenderer;
 pub use camera::{Camera, View};
 pub use gpu::Gpu;
 pub use lighting::{Light, Lighting, Sky, Specular};

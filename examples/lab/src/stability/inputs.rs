@@ -4,7 +4,7 @@
 use glam::{DVec3, Mat4, Vec3};
 use half::f16;
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Atlas, Frame};
+use subsurface::{Atlas, BackLayer, Frame};
 
 use crate::renderer::Gpu;
 use crate::stability::lab::OUTPUT;
@@ -20,6 +20,8 @@ pub struct Texels {
     pub profile_id: Vec<u8>,
     /// And 1 in the last component; all 0 where there is no skin.
     pub positions_mm: Vec<[f32; 4]>,
+    /// Irradiance and depth of the layer behind.
+    pub back: Option<(Vec<[f32; 4]>, Vec<f32>)>,
     pub projection: Mat4,
     /// The unit in which they are handed over.
     pub mm_per_unit: f32,
@@ -31,6 +33,7 @@ pub struct Uploaded {
     depth: TextureView,
     profile_id: TextureView,
     positions: TextureView,
+    back: Option<[TextureView; 2]>,
     pub output: TextureView,
     projection: Mat4,
     mm_per_unit: f32,
@@ -39,23 +42,24 @@ pub struct Uploaded {
 impl Texels {
     /// Of skin; `background` is the light where nothing is hit.
     pub fn of(g: &GBuffer, background: f64) -> Self {
-        let light = |e: DVec3| e.as_vec3().extend(1.0).to_array();
-        let depth = |point: DVec3| {
-            let clip = g.view.projection * point.extend(1.0);
-            (clip.z / clip.w) as f32
-        };
         let position = |point: DVec3| point.as_vec3().extend(1.0).to_array();
         let hits = || g.hits.iter().copied();
-        let background = DVec3::splat(background);
+        let (irradiance, depth) = light_and_depth(g, background);
         Self {
             size: g.view.size,
-            irradiance: hits().map(|h| light(h.map_or(background, |h| h.irradiance))).collect(),
-            depth: hits().map(|h| h.map_or(0.0, |h| depth(h.point))).collect(),
+            irradiance,
+            depth,
             profile_id: hits().map(|h| h.map_or(0, |h| h.id as u8)).collect(),
             positions_mm: hits().map(|h| h.map_or([0.0; 4], |h| position(h.point))).collect(),
+            back: None,
             projection: g.view.projection.as_mat4(),
             mm_per_unit: 1.0,
         }
+    }
+
+    /// With a layer behind it.
+    pub fn before(self, back: &GBuffer) -> Self {
+        Self { back: Some(light_and_depth(back, 0.0)), ..self }
     }
 
     /// Lights a pixel, in grey.
@@ -81,12 +85,17 @@ impl Texels {
         let positions = self.positions_mm.iter();
         let positions: Vec<_> =
             positions.map(|[x, y, z, id]| [x / unit, y / unit, z / unit, *id]).collect();
-        let halves = self.irradiance.iter();
-        let halves: Vec<_> = halves.map(|e| e.map(|c| f16::from_f32(c).to_bits())).collect();
+        let half = |c| f16::from_f32(c).to_bits();
+        let light = |name: &str, texels: &[[f32; 4]]| {
+            let halves: Vec<_> = texels.iter().map(|e| e.map(half)).collect();
+            gpu.upload(name, size, TextureFormat::Rgba16Float, &halves)
+        };
+        let depth = |name: &str, texels: &[f32]| gpu.upload(name, size, TextureFormat::R32Float, texels);
         let full = TextureFormat::Rgba32Float;
         Uploaded {
-            irradiance: gpu.upload("irradiance", size, TextureFormat::Rgba16Float, &halves),
-            depth: gpu.upload("depth", size, TextureFormat::R32Float, &self.depth),
+            irradiance: light("irradiance", &self.irradiance),
+            depth: depth("depth", &self.depth),
+            back: self.back.as_ref().map(|(e, z)| [light("back irradiance", e), depth("back depth", z)]),
             profile_id: gpu.upload("profile id", size, TextureFormat::R8Uint, &self.profile_id),
             positions: gpu.upload("positions", size, full, &positions),
             output: gpu.target("scattered", size, OUTPUT),
@@ -102,10 +111,27 @@ impl Uploaded {
         let mut frame = Frame::new(&self.irradiance, &self.depth, projection);
         frame.profile_id = Some(&self.profile_id);
         frame.mm_per_unit = self.mm_per_unit;
+        let back = self.back.as_ref();
+        frame.back = back.map(|[irradiance, depth]| BackLayer { irradiance, depth, profile_id: None });
         frame
     }
 
     pub fn atlas(&self) -> Atlas<'_> {
         Atlas { irradiance: &self.irradiance, positions: &self.positions, mm_per_unit: self.mm_per_unit }
     }
+}
+
+/// Of each pixel; `background` where nothing is hit, at the depth of the far plane.
+fn light_and_depth(g: &GBuffer, background: f64) -> (Vec<[f32; 4]>, Vec<f32>) {
+    let background = DVec3::splat(background);
+    let light = |e: DVec3| e.as_vec3().extend(1.0).to_array();
+    let depth = |point: DVec3| {
+        let clip = g.view.projection * point.extend(1.0);
+        (clip.z / clip.w) as f32
+    };
+    let hits = || g.hits.iter();
+    (
+        hits().map(|h| light(h.map_or(background, |h| h.irradiance))).collect(),
+        hits().map(|h| h.map_or(0.0, |h| depth(h.point))).collect(),
+    )
 }

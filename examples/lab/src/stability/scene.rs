@@ -29,6 +29,8 @@ type Scattered = Box<dyn Fn(DVec3, DVec3) -> DVec3>;
 pub struct Surface {
     form: Form,
     middle_mm: DVec3,
+    /// Whether it is a plane that shows the camera its inside.
+    is_turned_away: bool,
     light: Light,
     scattered: Option<Scattered>,
 }
@@ -48,17 +50,17 @@ impl Form {
         Self::Plane { along, down: along.cross(tilted_normal(tilt, axis)), size_mm: DVec2::splat(side_mm) }
     }
 
-    /// Where a ray meets it first, from its middle.
-    fn meet(&self, origin: DVec3, ray: DVec3) -> Option<DVec3> {
+    /// Where a ray meets it, from its middle: where it enters, or where it leaves what is closed.
+    fn meet(&self, origin: DVec3, ray: DVec3, leaves: bool) -> Option<DVec3> {
         let along_ray = match *self {
             Self::Plane { .. } => {
                 let normal = self.normal(DVec3::ZERO);
                 -origin.dot(normal) / ray.dot(normal)
             }
             Self::Cylinder { along, rho_mm, .. } => {
-                enters(origin.reject_from(along), ray.reject_from(along), rho_mm)?
+                through(origin.reject_from(along), ray.reject_from(along), rho_mm)?[usize::from(leaves)]
             }
-            Self::Sphere { rho_mm } => enters(origin, ray, rho_mm)?,
+            Self::Sphere { rho_mm } => through(origin, ray, rho_mm)?[usize::from(leaves)],
         };
         Some(origin + ray * along_ray)
     }
@@ -117,17 +119,18 @@ impl Form {
     }
 }
 
-/// How far along a ray, in its own lengths, a ball around the origin begins.
-fn enters(origin: DVec3, ray: DVec3, rho_mm: f64) -> Option<f64> {
+/// How far along a ray, in its own lengths, a ball around the origin begins and ends.
+fn through(origin: DVec3, ray: DVec3, rho_mm: f64) -> Option<[f64; 2]> {
     let (a, b) = (ray.length_squared(), origin.dot(ray));
     let root = b * b - a * (origin.length_squared() - rho_mm * rho_mm);
-    (root >= 0.0).then(|| (-b - root.sqrt()) / a)
+    (root >= 0.0).then(|| [-1.0, 1.0].map(|side| (-b + side * root.sqrt()) / a))
 }
 
 impl Surface {
     /// At a distance of 300 mm.
     pub fn new(form: Form, light: impl Fn(DVec3, DVec3) -> Option<DVec3> + 'static) -> Self {
-        Self { form, middle_mm: DVec3::new(0.0, 0.0, -300.0), light: Box::new(light), scattered: None }
+        let middle_mm = DVec3::new(0.0, 0.0, -300.0);
+        Self { form, middle_mm, is_turned_away: false, light: Box::new(light), scattered: None }
     }
 
     /// Whose scattered light is known.
@@ -180,8 +183,18 @@ impl Surface {
         self
     }
 
-    fn hit(&self, origin: DVec3, ray: DVec3) -> Option<Hit> {
-        let point = self.form.meet(origin - self.middle_mm, ray)?;
+    /// A plane that shows the camera its inside.
+    pub fn turned_away(self) -> Self {
+        Self { is_turned_away: true, ..self }
+    }
+
+    /// What of it faces the camera on a ray, or, `away`, is turned away from it.
+    fn hit(&self, origin: DVec3, ray: DVec3, away: bool) -> Option<Hit> {
+        let is_open = matches!(self.form, Form::Plane { .. });
+        if is_open && self.is_turned_away != away {
+            return None;
+        }
+        let point = self.form.meet(origin - self.middle_mm, ray, away)?;
         let normal = self.form.normal(point);
         Some(Hit { irradiance: (self.light)(point, normal)?, point: point + self.middle_mm, normal, id: 1 })
     }
@@ -191,12 +204,24 @@ impl Scene {
     /// The surface that is seen along a ray, and what of it.
     pub fn hit(&self, origin: DVec3, ray: DVec3) -> Option<(usize, Hit)> {
         let hits = self.0.iter().enumerate();
-        hits.filter_map(|(i, s)| s.hit(origin, ray).map(|hit| (i, hit)))
+        hits.filter_map(|(i, s)| s.hit(origin, ray, false).map(|hit| (i, hit)))
             .max_by(|(_, a), (_, b)| a.point.z.total_cmp(&b.point.z))
+    }
+
+    /// The nearest surface behind the one that is seen, of those that are turned away.
+    fn behind(&self, origin: DVec3, ray: DVec3) -> Option<Hit> {
+        let (_, seen) = self.hit(origin, ray)?;
+        let hits = self.0.iter().filter_map(|s| s.hit(origin, ray, true));
+        hits.filter(|hit| hit.point.z < seen.point.z).max_by(|a, b| a.point.z.total_cmp(&b.point.z))
     }
 
     pub fn shoot(&self, view: &View) -> GBuffer {
         view.shoot(|origin, ray| self.hit(origin, ray).map(|(_, hit)| hit))
+    }
+
+    /// The layer right behind what [`shoot`](Self::shoot) sees.
+    pub fn shoot_back(&self, view: &View) -> GBuffer {
+        view.shoot(|origin, ray| self.behind(origin, ray))
     }
 
     /// Islands of `texels` each in a row.

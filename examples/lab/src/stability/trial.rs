@@ -16,6 +16,8 @@ use crate::synthetic::{GBuffer, Hit, View};
 pub enum Truth {
     /// Eq. 7 over what the camera sees.
     Visible,
+    /// Eq. 7 over that and the layer behind it.
+    Layers,
     /// Eq. 7 over the surfaces whole, as the atlas holds them.
     Whole,
     /// Eq. 7 in closed form.
@@ -30,6 +32,8 @@ pub struct Trial {
     pub view: View,
     /// Light where there is no surface.
     background: f64,
+    /// Whether the methods that know what to do with it are handed the layer behind what is seen.
+    has_back: bool,
     /// Where pixels are asked for, and what a picture shows.
     crop: Crop,
     /// Of which pixels; those beside another surface, or beside none, are never asked for.
@@ -43,6 +47,7 @@ pub struct Trial {
 /// A frame, scattered by the methods in screen space.
 pub struct Look {
     g: GBuffer,
+    back: Option<GBuffer>,
     crop: Crop,
     results: Results,
     /// Pixels that are asked for, the surface that each shows, and what of it.
@@ -53,7 +58,13 @@ pub struct Look {
 impl Trial {
     /// All pixels of `crop`, before nothing, in screen space alone.
     pub fn new(scene: Scene, view: View, crop: Crop, truth: Truth) -> Self {
-        Self { scene, view, background: 0.0, crop, asked: Box::new(|_| true), truth, atlas: None }
+        let asked = Box::new(|_: &Hit| true);
+        Self { scene, view, background: 0.0, has_back: false, crop, asked, truth, atlas: None }
+    }
+
+    /// With the layer behind what is seen.
+    pub fn with_back(self) -> Self {
+        Self { has_back: true, ..self }
     }
 
     pub fn before(self, background: f64) -> Self {
@@ -87,7 +98,13 @@ impl Trial {
     /// A frame that a method refuses.
     pub fn look(&self, lab: &Lab) -> Result<Look, Error> {
         let g = self.scene.shoot(&self.view);
-        let frame = Texels::of(&g, self.background).upload(&lab.gpu);
+        let back = self.has_back.then(|| self.scene.shoot_back(&self.view));
+        let texels = Texels::of(&g, self.background);
+        let texels = match &back {
+            Some(back) => texels.before(back),
+            None => texels,
+        };
+        let frame = texels.upload(&lab.gpu);
         let pixels = self.crop.pixels(self.view.size[0]).into_iter();
         let pixels = pixels.filter_map(|pixel| {
             let surface = self.surface_at(pixel)?;
@@ -100,6 +117,7 @@ impl Trial {
             results: lab.scatter(&frame.frame(), &frame.output)?,
             truth: vec![],
             g,
+            back,
         };
         look.truth = look.held_to(self.truth, &self.scene, None);
         Ok(look)
@@ -172,9 +190,10 @@ impl Look {
     pub fn held_to(&self, truth: Truth, scene: &Scene, atlas: Option<&Unwrapped>) -> Known {
         let pixels = self.pixels.iter().map(|(pixel, ..)| *pixel);
         let truth = match truth {
-            Truth::Visible => {
+            Truth::Visible | Truth::Layers => {
                 let pixels: Vec<usize> = pixels.clone().collect();
-                self.g.visible_integral(&pixels, &Profile::SKIN)
+                let back = self.back.as_ref().filter(|_| matches!(truth, Truth::Layers));
+                self.g.integral_over(back, &pixels, &Profile::SKIN)
             }
             Truth::Whole => {
                 let points = self.pixels.iter().map(|(.., h)| (h.point, h.irradiance));

@@ -139,14 +139,15 @@ pub fn scattered_cosine_around(rho_mm: f64, profile: &Profile) -> impl Fn(f64) -
     }
 }
 
-/// What an endless slab passes that is lit by 1 from behind: Eq. 7 as printed, over its two faces. Divided by
-/// the kernel's mass on both, as the others are, it would be less.
-pub fn through_slab(thickness_mm: f64, profile: &Profile) -> DVec3 {
-    let gaussians = profile.gaussians().iter();
-    gaussians
-        .map(|g| {
-            let v = f64::from(g.variance_mm2);
-            glam::DVec3::from(g.weight.map(f64::from)) * (-thickness_mm * thickness_mm / (2.0 * v)).exp()
-        })
-        .sum()
+/// What an endless slab passes that is lit by 1 from behind: Eq. 7 as printed, over its two faces, and with each
+/// Gaussian divided by its mass on both, as the other closed forms are.
+pub fn through_slab(thickness_mm: f64, profile: &Profile) -> [DVec3; 2] {
+    let mut passed = [DVec3::ZERO; 2];
+    for g in profile.gaussians() {
+        let weight = glam::DVec3::from(g.weight.map(f64::from));
+        let share = (-thickness_mm * thickness_mm / (2.0 * f64::from(g.variance_mm2))).exp();
+        passed[0] += weight * share;
+        passed[1] += weight * share / (1.0 + share);
+    }
+    passed
 }

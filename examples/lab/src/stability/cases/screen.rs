@@ -232,7 +232,7 @@ fn behind(quick: bool) -> Vec<Case> {
         [by_nature(EXACT, exact, why), by_nature(PLAN, plan, why)]
     };
     let slab = |thickness_mm: f64| {
-        let through = through_slab(thickness_mm, &Profile::SKIN);
+        let [through, _] = through_slab(thickness_mm, &Profile::SKIN);
         let make = move || {
             let view = View::orthographic([96; 2], 4.0);
             let face = || Form::facing(24.0);
@@ -269,7 +269,7 @@ fn behind(quick: bool) -> Vec<Case> {
     let finger = |d| case("a finger", d, 128, [104, 40], [160, 64], |d| cylinder(8.0, d));
     let lit = |d| Scene(vec![Surface::lit(ball(), from_camera(d, direction(27.0)))]);
     let head = |d| case("a head", d, 96, [88, if quick { 44 } else { 88 }], [160; 2], lit);
-    vec![
+    let mut cases = vec![
         slab(1.5),
         slab(4.0).pictured(false),
         rim.known(unseen([0.17; 2])),
@@ -277,6 +277,63 @@ fn behind(quick: bool) -> Vec<Case> {
         finger(130.0).known(unseen([0.018, 0.0113])),
         head(90.0),
         head(130.0).known(unseen([0.015, 0.014])),
+    ];
+    cases.extend(two_layers(quick));
+    cases
+}
+
+/// The same with the layer behind what the camera sees, which holds the light that is missing.
+fn two_layers(quick: bool) -> Vec<Case> {
+    let slab = |thickness_mm: f64| {
+        let [_, through] = through_slab(thickness_mm, &Profile::SKIN);
+        let make = move || {
+            let view = View::orthographic([96; 2], 4.0);
+            let face = || Form::facing(24.0);
+            let near = Surface::solved(face(), |_, _| DVec3::ZERO, move |_, _| through);
+            let far = Surface::even(face(), 1.0).moved(DVec3::NEG_Z * thickness_mm).turned_away();
+            let crop = Crop::middle(&view, [16; 2]);
+            Trial::new(Scene(vec![near, far]), view, crop, Truth::Closed).with_back()
+        };
+        let what = "The same two faces with the hidden one handed in: difference to what Eq. 7 passes with each \
+            Gaussian divided by its mass on both faces.";
+        trial(format!("an ear {thickness_mm} mm thick, two layers"), what, GRADIENT, make)
+    };
+    let case = |part: &str, size: u32, crop, scene: fn() -> Scene| {
+        let make = move || {
+            let view = View::orthographic([size; 2], 4.0);
+            Trial::new(scene(), view, Crop::middle(&view, crop), Truth::Closed).with_back()
+        };
+        let what = "Rim, finger and ball lit from behind as above, with their far sides handed in: largest \
+            difference to the closed form, without the pixels at their rims.";
+        trial(format!("{part} lit from behind, two layers"), what, GRADIENT, make)
+    };
+    // Where the back is dark, to the integral over both layers.
+    let front = |part: &str, rho_mm: f64, crop| {
+        let make = move || {
+            let view = View::orthographic([128; 2], 4.0);
+            Trial::new(cylinder(rho_mm, 50.0), view, Crop::middle(&view, crop), Truth::Layers).with_back()
+        };
+        let what = "Rim and finger lit from 50 degrees to the side, with their far sides handed in: largest \
+            difference to Eq. 7 over both layers, without the pixels at their rims.";
+        trial(format!("{part} before black, two layers"), what, GRADIENT, make).pictured(false)
+    };
+    let half = if quick { 44 } else { 88 };
+    let planned =
+        |at_most| known(PLAN, at_most, "A plan does not look at the layer behind. Use the exact sum.");
+    let guess = "Most of a rim's area lies in the outer pixels and follows from a guessed slope.";
+    vec![
+        front("the rim of an ear", 0.75, [32, 24]).known([planned(0.14), known(EXACT, 0.03, guess)]),
+        front("a finger", 8.0, [96, 24]).known([planned(0.015)]),
+        slab(1.5).known([planned(0.182)]),
+        slab(2.0).pictured(false).known([planned(0.135)]),
+        slab(4.0).pictured(false).known([planned(0.0264)]),
+        case("the rim of an ear", 128, [31, 16], || cylinder(0.75, 150.0))
+            .known([planned(0.145), known(EXACT, 0.013, guess)]),
+        case("a finger", 128, [104, 40], || cylinder(8.0, 130.0)).known([planned(0.0113)]),
+        case("a head", 96, [88, half], || {
+            Scene(vec![Surface::lit(ball(), from_camera(130.0, direction(27.0)))])
+        })
+        .known([planned(0.014)]),
     ]
 }
 

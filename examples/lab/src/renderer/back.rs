@@ -1,0 +1,89 @@
+//! The surface right behind the visible one, as a host draws it for light that comes through thin parts. Driver
+//! of `back.wgsl`.
+
+use subsurface::BackLayer;
+use wgpu::{TextureFormat, TextureView};
+
+use super::mesh::Mesh;
+use super::{DEPTH, Gpu, IRRADIANCE, Pipeline, Renderer};
+
+/// Textures of the back layer, and the pass that draws it.
+pub struct BackRenderer {
+    irradiance: TextureView,
+    depth: TextureView,
+    profile_id: TextureView,
+    draw: wgpu::RenderPipeline,
+    visible: wgpu::BindGroup,
+}
+
+impl BackRenderer {
+    /// Behind what `renderer` draws.
+    pub fn new(gpu: &Gpu, renderer: &Renderer) -> Self {
+        let label = "subsurface_lab::renderer back";
+        let target = |format| gpu.target(label, renderer.size, format);
+        let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source: wgpu::ShaderSource::Wgsl(
+                [include_str!("material.wgsl"), include_str!("lighting.wgsl"), include_str!("back.wgsl")]
+                    .concat()
+                    .into(),
+            ),
+        });
+        let (layout, visible) = super::textures(gpu, label, None, &[&renderer.gbuffer.depth]);
+        let draw = super::pipeline(
+            gpu,
+            Pipeline {
+                label,
+                shader: &shader,
+                vertex: "vs_screen",
+                fragment: "fs_back",
+                groups: &[
+                    Some(&renderer.camera_layout),
+                    Some(&renderer.material_layout),
+                    Some(&renderer.lights.layout),
+                    Some(&layout),
+                ],
+                targets: &[IRRADIANCE, TextureFormat::R8Uint],
+                buffers: &[Mesh::VERTEX_LAYOUT],
+                depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Greater, true)),
+            },
+        );
+        Self {
+            irradiance: target(IRRADIANCE),
+            depth: target(DEPTH),
+            profile_id: target(TextureFormat::R8Uint),
+            draw,
+            visible,
+        }
+    }
+
+    /// Draws and lights what is behind the frame that `renderer` drew last: of skin alone.
+    pub fn render(&self, gpu: &Gpu, renderer: &Renderer) {
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+        gpu.run(|encoder| {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("subsurface_lab::renderer back"),
+                color_attachments: &[&self.irradiance, &self.profile_id]
+                    .map(|view| Some(super::color_attachment(view, clear))),
+                depth_stencil_attachment: Some(super::depth_attachment(
+                    &self.depth,
+                    wgpu::LoadOp::Clear(0.0),
+                )),
+                ..Default::default()
+            });
+            pass.set_pipeline(&self.draw);
+            pass.set_bind_group(0, &renderer.camera_group, &[]);
+            pass.set_bind_group(2, &renderer.lights.group, &[]);
+            pass.set_bind_group(3, &self.visible, &[]);
+            for mesh in renderer.meshes.iter().filter(|mesh| mesh.profile_id != 0) {
+                pass.set_bind_group(1, &mesh.material, &[]);
+                mesh.draw(&mut pass, 0..mesh.index_count);
+            }
+        });
+    }
+
+    /// As the effects take it.
+    pub fn layer(&self) -> BackLayer<'_> {
+        BackLayer { irradiance: &self.irradiance, depth: &self.depth, profile_id: Some(&self.profile_id) }
+    }
+}
