@@ -1,22 +1,34 @@
 //! What measures `subsurface`: a small deferred renderer that plays the host, the integrals that all is held
 //! against, the methods of others, and the programs that put them side by side.
 
+#[cfg(feature = "programs")]
 pub mod chart;
+#[cfg(feature = "programs")]
 pub mod compare;
+#[cfg(feature = "programs")]
 pub mod damage;
 mod error;
+#[cfg(feature = "programs")]
 pub mod filter;
 pub mod method;
 pub mod metrics;
+#[cfg(feature = "programs")]
 pub mod model;
+#[cfg(feature = "programs")]
 pub mod output;
+#[cfg(feature = "programs")]
 mod page;
 pub mod renderer;
-mod rivals;
+pub mod rivals;
+#[cfg(feature = "programs")]
 mod srgb;
+#[cfg(feature = "programs")]
 pub mod stability;
+#[cfg(feature = "programs")]
 mod svg;
+#[cfg(feature = "programs")]
 pub mod synthetic;
+#[cfg(feature = "programs")]
 pub mod truth;
 #[cfg(test)]
 mod wgsl;

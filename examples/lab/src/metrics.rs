@@ -12,6 +12,7 @@ use image::{Rgb, RgbImage};
 
 /// The viewing distance that FLIP assumes, in pixels per degree of visual angle. FLIP's default:
 /// a 0.7 m wide screen of 3840 pixels seen from 0.7 m.
+#[cfg(feature = "programs")]
 pub const PIXELS_PER_DEGREE: f32 = nv_flip::DEFAULT_PIXELS_PER_DEGREE;
 
 /// A picture of linear light: RGB with sRGB primaries, row-major from the top left.
@@ -138,6 +139,7 @@ pub fn delta_e2000_percentile(a: &Layer, reference: &Layer, mask: &[bool], fract
 /// and the whole error map in the magma colours (black 0, yellowish white 1).
 ///
 /// Both pictures are sRGB-encoded, as they are shown, and of one size.
+#[cfg(feature = "programs")]
 pub fn flip_mean(
     test_srgb: &RgbImage,
     reference_srgb: &RgbImage,

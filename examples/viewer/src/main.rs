@@ -9,7 +9,6 @@ mod layer;
 mod legend;
 mod level;
 mod options;
-mod orbit;
 mod panel;
 mod passes;
 mod planner;

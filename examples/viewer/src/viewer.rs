@@ -11,10 +11,9 @@ use egui::{
 use image::RgbImage;
 use subsurface::{Gaussian, Profile};
 use subsurface_lab::Error;
-use subsurface_lab::renderer::Lighting;
+use subsurface_lab::renderer::{Lighting, Orbit, turn_light};
 
 use crate::layer::{Layer, Mode};
-use crate::orbit::{Orbit, turn_light};
 use crate::planner::{Planner, Wish};
 use crate::stage::{Frame, Look, Picture, Request};
 use crate::{divider, legend, panel, shots};

@@ -2,10 +2,9 @@
 //! scatter it, and draws the result back onto the screen. Driver of `atlas.wgsl`
 //! and `resample.wgsl`.
 
-use std::time::Instant;
-
 use crate::Error;
 use subsurface::{Atlas, TextureSpace};
+use web_time::Instant;
 use wgpu::TextureFormat;
 
 use super::{Gpu, IRRADIANCE, Pipeline, Renderer, mesh::Mesh};

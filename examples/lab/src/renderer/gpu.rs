@@ -33,42 +33,47 @@ impl Gpu {
     /// # Errors
     /// As [`headless`](Self::headless).
     pub fn with(features: wgpu::Features) -> Result<Self, Error> {
-        pollster::block_on(async {
-            let no_adapter = |e: &dyn std::fmt::Display| {
-                Error::new(
-                    "graphics adapter",
-                    format!("none ({})", e.to_string().replace('\n', " ")),
-                    "a Vulkan, Metal or DirectX 12 driver; on Linux ./setup installs one",
-                )
-            };
-            let instance =
-                wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
-            let adapter = match wgpu::util::initialize_adapter_from_env(&instance, None).await {
-                Ok(adapter) => adapter,
-                Err(_) => instance
-                    .request_adapter(&wgpu::RequestAdapterOptions {
-                        power_preference: wgpu::PowerPreference::HighPerformance,
-                        ..Default::default()
-                    })
-                    .await
-                    .map_err(|e| no_adapter(&e))?,
-            };
-            let (device, queue) = adapter
-                .request_device(&wgpu::DeviceDescriptor {
-                    label: Some("subsurface_lab::Gpu"),
-                    required_features: adapter.features() & features,
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
+        pollster::block_on(Self::of(&instance, features))
+    }
+
+    /// The same of an instance, for those that may not wait: a page in a browser.
+    ///
+    /// # Errors
+    /// As [`headless`](Self::headless).
+    pub async fn of(instance: &wgpu::Instance, features: wgpu::Features) -> Result<Self, Error> {
+        let no_adapter = |e: &dyn std::fmt::Display| {
+            Error::new(
+                "graphics adapter",
+                format!("none ({})", e.to_string().replace('\n', " ")),
+                "a Vulkan, Metal or DirectX 12 driver; on Linux ./setup installs one",
+            )
+        };
+        let adapter = match wgpu::util::initialize_adapter_from_env(instance, None).await {
+            Ok(adapter) => adapter,
+            Err(_) => instance
+                .request_adapter(&wgpu::RequestAdapterOptions {
+                    power_preference: wgpu::PowerPreference::HighPerformance,
                     ..Default::default()
                 })
                 .await
-                .map_err(|e| no_adapter(&e))?;
-            let info = adapter.get_info();
-            Ok(Self {
-                adapter: format!("{} ({:?}, {})", info.name, info.backend, info.driver_info),
-                is_cpu: info.device_type == wgpu::DeviceType::Cpu,
-                to_float: TextureBlitter::new(&device, TextureFormat::Rgba32Float),
-                device,
-                queue,
+                .map_err(|e| no_adapter(&e))?,
+        };
+        let (device, queue) = adapter
+            .request_device(&wgpu::DeviceDescriptor {
+                label: Some("subsurface_lab::Gpu"),
+                required_features: adapter.features() & features,
+                ..Default::default()
             })
+            .await
+            .map_err(|e| no_adapter(&e))?;
+        let info = adapter.get_info();
+        Ok(Self {
+            adapter: format!("{} ({:?}, {})", info.name, info.backend, info.driver_info),
+            is_cpu: info.device_type == wgpu::DeviceType::Cpu,
+            to_float: TextureBlitter::new(&device, TextureFormat::Rgba32Float),
+            device,
+            queue,
         })
     }
 
@@ -129,7 +134,8 @@ impl Gpu {
         })
     }
 
-    /// Submits what `record` records and waits until it is done. Returns what that returns.
+    /// Submits what `record` records and waits until it is done, but in a browser, which may not wait.
+    /// Returns what `record` returns.
     pub fn run<T>(&self, record: impl FnOnce(&mut wgpu::CommandEncoder) -> T) -> T {
         let mut encoder = self.device.create_command_encoder(&Default::default());
         let result = record(&mut encoder);
@@ -140,23 +146,33 @@ impl Gpu {
 
     /// The pixels of a float texture, row by row, red to alpha.
     pub fn read(&self, view: &TextureView) -> Vec<[f32; 4]> {
+        bytemuck::pod_collect_to_vec(&self.wait_for(self.copy_out(self.to_float(view).texture())))
+    }
+
+    /// A copy of a float texture as Rgba32Float.
+    pub fn to_float(&self, view: &TextureView) -> TextureView {
         let size = [view.texture().width(), view.texture().height()];
         let copy = self.target("subsurface_lab::Gpu copy", size, TextureFormat::Rgba32Float);
         self.run(|encoder| self.to_float.copy(&self.device, encoder, view, &copy));
-        bytemuck::pod_collect_to_vec(&self.read_bytes(copy.texture()))
+        copy
     }
 
     /// The bytes of an uncompressed texture, row by row.
     pub fn read_bytes(&self, texture: &wgpu::Texture) -> Vec<u8> {
+        self.wait_for(self.copy_out(texture))
+    }
+
+    /// Copies the bytes of an uncompressed texture to where the CPU can read them.
+    pub fn copy_out(&self, texture: &wgpu::Texture) -> Readback {
         let texel = texture.format().block_copy_size(None).unwrap_or(0);
         let row = texture.width() * texel;
         let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let bytes = u64::from(padded) * u64::from(texture.height());
-        let rows = self.read_back(bytes, |encoder, buffer| {
+        let readback = Readback::new(self, [row, padded], texture.height());
+        self.run(|encoder| {
             encoder.copy_texture_to_buffer(
                 texture.as_image_copy(),
                 wgpu::TexelCopyBufferInfo {
-                    buffer,
+                    buffer: &readback.buffer,
                     layout: wgpu::TexelCopyBufferLayout {
                         offset: 0,
                         bytes_per_row: Some(padded),
@@ -166,43 +182,52 @@ impl Gpu {
                 texture.size(),
             );
         });
-        let rows = rows.chunks_exact(padded as usize);
-        rows.flat_map(|r| &r[..row as usize]).copied().collect()
+        readback
     }
 
-    /// The first bytes of a buffer.
-    pub(super) fn read_buffer(&self, buffer: &wgpu::Buffer, bytes: u64) -> Vec<u8> {
-        self.read_back(bytes, |encoder, to| encoder.copy_buffer_to_buffer(buffer, 0, to, 0, bytes))
-    }
-
-    /// What `copy` records into a buffer of so many bytes.
-    fn read_back(
-        &self,
-        bytes: u64,
-        copy: impl FnOnce(&mut wgpu::CommandEncoder, &wgpu::Buffer),
-    ) -> Vec<u8> {
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("subsurface_lab::Gpu readback"),
-            size: bytes,
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = self.device.create_command_encoder(&Default::default());
-        copy(&mut encoder, &buffer);
-        self.queue.submit([encoder.finish()]);
-        buffer.slice(..).map_async(wgpu::MapMode::Read, |_| {});
+    /// Maps what was copied, and waits for it.
+    pub(super) fn wait_for(&self, readback: Readback) -> Vec<u8> {
+        readback.buffer.map_async(wgpu::MapMode::Read, .., |_| {});
         self.wait();
-        let bytes = buffer
-            .slice(..)
-            .get_mapped_range()
-            .expect("a readback buffer is mapped once the device has been waited for");
-        bytes.to_vec()
+        readback.bytes()
     }
 
     fn wait(&self) {
         self.device
             .poll(wgpu::PollType::wait_indefinitely())
             .expect("a headless device is only lost with its driver");
+    }
+}
+
+/// Bytes on their way from the device.
+pub struct Readback {
+    /// To be mapped before they are read.
+    pub buffer: wgpu::Buffer,
+    /// Bytes of a row, without and with what pads it.
+    row: [u32; 2],
+}
+
+impl Readback {
+    /// Rows of so many bytes, without and with what pads them.
+    pub(super) fn new(gpu: &Gpu, row: [u32; 2], rows: u32) -> Self {
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("subsurface_lab::Gpu readback"),
+            size: u64::from(row[1]) * u64::from(rows),
+            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+            mapped_at_creation: false,
+        });
+        Self { buffer, row }
+    }
+
+    /// The rows, without what pads them.
+    ///
+    /// # Panics
+    /// Where the buffer is not mapped.
+    pub fn bytes(&self) -> Vec<u8> {
+        let mapped =
+            self.buffer.get_mapped_range(..).expect("a readback buffer is mapped before it is read");
+        let [row, padded] = self.row.map(|bytes| bytes as usize);
+        mapped.chunks_exact(padded).flat_map(|r| &r[..row]).copied().collect()
     }
 }
 

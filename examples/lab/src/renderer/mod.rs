@@ -16,6 +16,7 @@ mod lighting;
 mod materials;
 mod mesh;
 mod names;
+mod orbit;
 mod pages;
 mod probe;
 mod reader;
@@ -26,11 +27,14 @@ mod timestamps;
 pub use atlas::AtlasRenderer;
 pub use back::BackRenderer;
 pub use camera::{Camera, View};
-pub use gpu::Gpu;
+pub use gpu::{Gpu, Readback};
 pub use lighting::{Light, Lighting, Sky, Specular};
+pub use orbit::{Orbit, turn_light};
 pub use probe::{Probe, Visible};
 pub use scene::{Image, Material, Primitive, Scene, Vertex};
 pub use timestamps::Timestamps;
+
+use std::ops::Range;
 
 use crate::Error;
 use bytemuck::{Pod, Zeroable};
@@ -301,7 +305,30 @@ impl Renderer {
 
     /// The picture that a diffuse layer gives: tone-mapped sRGB bytes, red, green, blue.
     pub fn compose(&self, gpu: &Gpu, diffuse: &TextureView, layer: Layer, exposure: f32) -> Vec<[u8; 3]> {
-        let picture = gpu.target("subsurface_lab::renderer picture", self.size, PICTURE);
+        let picture = self.picture_target(gpu);
+        self.draw_picture(gpu, diffuse, layer, exposure, 0..self.size[0], &picture);
+        gpu.read_bytes(picture.texture()).chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect()
+    }
+
+    /// A target for pictures, of this renderer's size: Rgba8UnormSrgb.
+    pub fn picture_target(&self, gpu: &Gpu) -> TextureView {
+        gpu.target("subsurface_lab::renderer picture", self.size, PICTURE)
+    }
+
+    /// Draws the picture that a diffuse layer gives into these columns of a target that
+    /// [`picture_target`](Self::picture_target) made, and leaves the others.
+    ///
+    /// # Panics
+    /// Columns that the target does not have.
+    pub fn draw_picture(
+        &self,
+        gpu: &Gpu,
+        diffuse: &TextureView,
+        layer: Layer,
+        exposure: f32,
+        columns: Range<u32>,
+        picture: &TextureView,
+    ) {
         gpu.queue.write_buffer(
             &self.compose_uniform,
             0,
@@ -317,17 +344,14 @@ impl Renderer {
         gpu.run(|encoder| {
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("subsurface_lab::renderer compose"),
-                color_attachments: &[Some(color_attachment(
-                    &picture,
-                    wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                ))],
+                color_attachments: &[Some(color_attachment(picture, wgpu::LoadOp::Load))],
                 ..Default::default()
             });
             pass.set_pipeline(&self.compose);
             pass.set_bind_group(0, &group, &[]);
+            pass.set_scissor_rect(columns.start, 0, columns.len() as u32, self.size[1]);
             pass.draw(0..3, 0..1);
         });
-        gpu.read_bytes(picture.texture()).chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect()
     }
 }
 

@@ -3,9 +3,10 @@
 use wgpu::{BufferUsages, CommandEncoder, QuerySet};
 
 use super::Gpu;
+use super::gpu::Readback;
 
 /// Bytes of a time.
-const TIME: u64 = 8;
+const TIME: u32 = 8;
 
 /// Queries for times, read back.
 pub struct Timestamps {
@@ -29,7 +30,7 @@ impl Timestamps {
             }),
             resolved: gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label,
-                size: TIME * u64::from(count),
+                size: u64::from(TIME * count),
                 usage: BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC,
                 mapped_at_creation: false,
             }),
@@ -51,17 +52,33 @@ impl Timestamps {
 
     /// Submits what `record` records, waits, and reads as many queries as that says it wrote: in ms.
     pub fn run<T>(&self, gpu: &Gpu, record: impl FnOnce(&mut CommandEncoder) -> (T, u32)) -> (T, Vec<f64>) {
-        let (result, count) = gpu.run(|encoder| {
+        let (result, times) = self.submit(gpu, record);
+        (result, times.map_or(Vec::new(), |times| Self::ms(gpu, &gpu.wait_for(times))))
+    }
+
+    /// Submits what `record` records, and copies out as many queries as that says it wrote, if any.
+    pub fn submit<T>(
+        &self,
+        gpu: &Gpu,
+        record: impl FnOnce(&mut CommandEncoder) -> (T, u32),
+    ) -> (T, Option<Readback>) {
+        gpu.run(|encoder| {
             let (result, count) = record(encoder);
-            if count > 0 {
-                encoder.resolve_query_set(&self.queries, 0..count, &self.resolved, 0);
+            if count == 0 {
+                return (result, None);
             }
-            (result, count)
-        });
+            let bytes = TIME * count;
+            let times = Readback::new(gpu, [bytes; 2], 1);
+            encoder.resolve_query_set(&self.queries, 0..count, &self.resolved, 0);
+            encoder.copy_buffer_to_buffer(&self.resolved, 0, &times.buffer, 0, u64::from(bytes));
+            (result, Some(times))
+        })
+    }
+
+    /// What was copied out, in ms.
+    pub fn ms(gpu: &Gpu, bytes: &[u8]) -> Vec<f64> {
         let period_ns = f64::from(gpu.queue.get_timestamp_period());
-        let bytes = gpu.read_buffer(&self.resolved, TIME * u64::from(count));
-        let times: Vec<u64> = bytemuck::pod_collect_to_vec(&bytes);
-        let times = times.into_iter().map(|t| t as f64 * period_ns * 1e-6);
-        (result, times.collect())
+        let times: Vec<u64> = bytemuck::pod_collect_to_vec(bytes);
+        times.into_iter().map(|t| t as f64 * period_ns * 1e-6).collect()
     }
 }

@@ -2,8 +2,8 @@
 
 use std::f32::consts::FRAC_PI_2;
 
+use super::Camera;
 use glam::{Quat, Vec3};
-use subsurface_lab::renderer::Camera;
 
 /// At the poles the camera would not know where up is.
 const MAX_PITCH: f32 = 0.97 * FRAC_PI_2;
