@@ -24,8 +24,8 @@ const SHOWS = {
 const METHODS = {
   none: ["no scattering", "#999999"],
   copy: ["copy", "#999999"],
-  screen_exact: ["screen space, exact sum", "#ffffff"],
-  screen_planned: ["screen space, a plan", "#2f9be0"],
+  screen_exact: ["exact sum", "#ffffff"],
+  screen_planned: ["a plan", "#2f9be0"],
   texture_separable: ["texture space", "#009e73"],
   jimenez_2009: ["Jimenez 2009", "#e69f00"],
   jimenez_separable: ["Jimenez separable", "#d55e00"],

@@ -1,7 +1,7 @@
 // Opens the page in headless Chromium and does what people do: node test/browser.mjs PAGE NATIVE PLAYWRIGHT [SHOT]
 //
 // PAGE is the built page; NATIVE, what `compare --size 256x256 --texture-size 512` wrote; PLAYWRIGHT, the folder that
-// playwright-core is installed in; SHOT, a picture of the page to be written.
+// playwright-core is installed in; SHOT, a JPEG of the page to be written.
 
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
@@ -347,7 +347,7 @@ if (shot) {
   await page.click("#chart");
   await page.waitForFunction(() => subsurface.chart && !subsurface.state.isBusy);
   await page.evaluate(() => document.getElementById("panel").scrollTo(0, 1e4));
-  await page.screenshot({ path: shot });
+  await page.screenshot({ path: shot, type: "jpeg", quality: 80 });
 }
 
 await browser.close();
