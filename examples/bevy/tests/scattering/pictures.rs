@@ -25,7 +25,6 @@ fn write(name: &str, byte: impl Fn(usize, usize) -> u8) {
     JpegEncoder::new_with_quality(&mut jpeg, 85)
         .encode(&bytes, SIZE[0], SIZE[1], image::ExtendedColorType::Rgb8)
         .expect("a picture");
-    if let Ok(dir) = std::env::var("TMP_PNG") { image::save_buffer(format!("{dir}/{name}.png"), &bytes, SIZE[0], SIZE[1], image::ExtendedColorType::Rgb8).unwrap(); }
     std::fs::write(path, jpeg).expect("a file that is written");
 }
 
@@ -52,7 +51,7 @@ fn head(stage: &mut Stage) -> (Handle<Image>, Entity) {
         world.entity_mut(camera).insert((
             sky,
             Projection::from(PerspectiveProjection { fov: 0.5, near: 0.05, ..default() }),
-            Transform::from_xyz(-0.12, -0.01, 0.55).looking_at(Vec3::new(0.0, -0.02, 0.0), Vec3::Y),
+            Transform::from_xyz(-0.06, -0.02, 0.42).looking_at(Vec3::new(0.0, -0.03, 0.0), Vec3::Y),
         ));
         camera
     });
