@@ -18,7 +18,7 @@ fn wax() -> SubsurfaceProfile {
 }
 
 /// How a camera looks.
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 struct Look {
     from: Vec3,
     fov: f32,
@@ -37,7 +37,7 @@ fn add_look(world: &mut World, target: &Handle<Image>, look: &Look) -> Entity {
         ..default()
     });
     world.entity_mut(camera).insert((
-        Camera { order: look.order, viewport, clear_color: look.clear_color.clone(), ..default() },
+        Camera { order: look.order, viewport, clear_color: look.clear_color, ..default() },
         Transform::from_translation(look.from).looking_at(Vec3::ZERO, Vec3::Y),
         Projection::from(PerspectiveProjection { fov: look.fov, near: 0.01, ..default() }),
         look.settings,
@@ -83,10 +83,10 @@ fn each_camera_is_as_if_alone() {
         fov: 0.9,
         settings: SubsurfaceScattering { max_error: 0.02, ..default() },
         order: 1,
-        ..left.clone()
+        ..left
     };
-    let alone = [&left, &right].map(|look| pictures(&mut stage, std::slice::from_ref(look), false));
-    let both = pictures(&mut stage, &[left.clone(), right.clone()], false);
+    let alone = [left, right].map(|look| pictures(&mut stage, &[look], false));
+    let both = pictures(&mut stage, &[left, right], false);
     for (picture, alone) in both.iter().zip(&alone) {
         assert_eq!(picture.difference(&alone[0], |_| true), (0.0, 0));
     }
@@ -99,7 +99,7 @@ fn each_camera_is_as_if_alone() {
         let (x, y) = (i as u32 % SIZE[0], i as u32 / SIZE[0]);
         (128..248).contains(&x) && (16..246).contains(&y)
     };
-    let both = pictures(&mut stage, &[left.clone(), right.clone()], true);
+    let both = pictures(&mut stage, &[left, right], true);
     let alone = pictures(&mut stage, &[left], true);
     assert_eq!(both[0].difference(&alone[0], |i| i as u32 % SIZE[0] < 128), (0.0, 0));
     let alone =
