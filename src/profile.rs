@@ -25,6 +25,7 @@ pub struct Gaussian {
 pub struct Profile {
     gaussians: [Gaussian; Self::MAX_GAUSSIANS],
     len: usize,
+    fit_error: f32,
 }
 
 /// As in shaders/exact/gaussian_sum.wgsl.
@@ -53,6 +54,7 @@ impl Profile {
             NONE,
         ],
         len: 6,
+        fit_error: 0.0,
     };
 
     /// A profile of the given Gaussians, in any order; each colour's weights are scaled to sum
@@ -88,7 +90,8 @@ impl Profile {
             let needs = "a finite sum above 0 in every colour";
             return refuse("profile: sum of the weights".into(), sum, needs);
         }
-        let mut profile = Self { gaussians: [NONE; Self::MAX_GAUSSIANS], len: gaussians.len() };
+        let mut profile =
+            Self { gaussians: [NONE; Self::MAX_GAUSSIANS], len: gaussians.len(), fit_error: 0.0 };
         for (to, from) in profile.gaussians.iter_mut().zip(gaussians) {
             *to = Gaussian {
                 variance_mm2: from.variance_mm2,
@@ -98,8 +101,22 @@ impl Profile {
         Ok(profile)
     }
 
+    /// The same profile, which is off by so much at the worst, 0 to 1, from the step edges of what it was
+    /// fitted to. A plan adds that to its own ([`Plan::stated_error`](crate::Plan::stated_error)).
+    ///
+    /// # Errors
+    /// A number out of its range.
+    pub fn with_fit_error(self, fit_error: f32) -> Result<Self, Error> {
+        if !(0.0..=1.0).contains(&fit_error) {
+            let input = "profile: fit_error".into();
+            return Err(Error::Number { input, got: fit_error.into(), needs: "0 to 1, in units of white" });
+        }
+        Ok(Self { fit_error, ..self })
+    }
+
     /// A profile from JSON, as in
-    /// `{"gaussians": [{"variance_mm2": 0.0064, "weight": [0.233, 0.455, 0.649]}]}`.
+    /// `{"gaussians": [{"variance_mm2": 0.0064, "weight": [0.233, 0.455, 0.649]}]}`, beside them its
+    /// `"fit_error"` if it has one.
     ///
     /// # Errors
     /// Text that is not of this form, and all that [`Profile::new`] refuses.
@@ -111,6 +128,11 @@ impl Profile {
             needs: r#"{"gaussians": [{"variance_mm2": v, "weight": [r, g, b]}, …]}"#,
         })?;
         terms.try_into()
+    }
+
+    /// How far it is from what it was fitted to, in units of white; 0 where it stands for itself.
+    pub fn fit_error(&self) -> f32 {
+        self.fit_error
     }
 
     /// How far, in mm, the effects carry light: 3.5 σ of the widest Gaussian. Skin that is nearer than this
@@ -132,6 +154,13 @@ impl Profile {
 #[serde(deny_unknown_fields)]
 struct Terms {
     gaussians: Vec<Gaussian>,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    fit_error: f32,
+}
+
+#[cfg(feature = "json")]
+fn is_zero(x: &f32) -> bool {
+    *x == 0.0
 }
 
 #[cfg(feature = "json")]
@@ -139,14 +168,14 @@ impl TryFrom<Terms> for Profile {
     type Error = Error;
 
     fn try_from(terms: Terms) -> Result<Self, Error> {
-        Self::new(&terms.gaussians)
+        Self::new(&terms.gaussians)?.with_fit_error(terms.fit_error)
     }
 }
 
 #[cfg(feature = "json")]
 impl From<Profile> for Terms {
     fn from(profile: Profile) -> Self {
-        Self { gaussians: profile.gaussians().to_vec() }
+        Self { gaussians: profile.gaussians().to_vec(), fit_error: profile.fit_error }
     }
 }
 
@@ -205,6 +234,11 @@ mod tests {
         let text = r#"{"gaussians": [{"variance_mm2": 0.5, "weight": [1, 2, 4]}]}"#;
         let profile = Profile::from_json(text).unwrap();
         assert_eq!(profile.gaussians(), [gaussian(0.5, 1.0)]);
+        let fitted = profile.with_fit_error(0.5).unwrap();
+        let text = serde_json::to_string(&fitted).unwrap();
+        assert_eq!(Profile::from_json(&text).unwrap(), fitted);
+        let error = Profile::from_json(&text.replace("0.5}", "-0.5}")).unwrap_err();
+        assert!(error.to_string().starts_with("profile: fit_error: got -0.5"), "{error}");
         for bad in ["", "[]", r#"{"gaussians": [{"variance": 1}]}"#, &text[..20]] {
             let error = Profile::from_json(bad).unwrap_err();
             assert!(matches!(error, Error::Json { input: "profile", .. }), "{error}");

@@ -25,7 +25,7 @@ const ROUNDS: usize = 24;
 /// A profile and what it is off by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// The profile.
+    /// The profile, with the worst of [`edge_error`](Self::edge_error) as its own.
     pub profile: Profile,
     /// The worst |ΔE| at a step edge, 0.02 mm from it or more, in red, green and blue, of light that
     /// albedo has not yet scaled.
@@ -177,7 +177,10 @@ impl Target {
         let search = Search::new(self);
         let see = |point: &Point| {
             let profile = search.profile(point)?;
-            Ok::<_, Error>(Fit { profile, edge_error: self.errors(&profile), floor, albedo: self.albedo })
+            let edge_error = self.errors(&profile);
+            let worst = edge_error.into_iter().fold(0.0, f64::max);
+            let profile = profile.with_fit_error(worst as f32)?;
+            Ok::<_, Error>(Fit { profile, edge_error, floor, albedo: self.albedo })
         };
         let fit = |narrowest: f64| {
             let (low, high) = (narrowest * self.x_mm[0], last / 5.0);

@@ -107,17 +107,20 @@ impl Skin {
         Medium::new(&layers, ETA)
     }
 
-    /// What the skin does with red, green and blue light: responses at all wavelengths, each times its
-    /// weight in a colour. (The mean of the *coefficients* over a colour would be wrong: docs/physics.md.)
+    /// What the skin does with red, green and blue light. (The mean of the *coefficients* over a colour would
+    /// be wrong: docs/physics.md.)
     ///
     /// # Errors
     /// A value out of its range, and as [`Transport::response`].
     pub fn responses(&self, transport: &Transport) -> Result<[Response; 3], Error> {
-        let responses = self
-            .spectrum()?
-            .iter()
-            .map(|(_, medium)| transport.response(medium))
-            .collect::<Result<Vec<_>, _>>()?;
-        Ok([0, 1, 2].map(|c| Response::sum(SPECTRUM.iter().map(|w| w.3[c]).zip(&responses))))
+        let spectrum = self.spectrum()?;
+        let responses = spectrum.iter().map(|(_, medium)| transport.response(medium));
+        Ok(Self::colours(&responses.collect::<Result<Vec<_>, _>>()?))
+    }
+
+    /// Red, green and blue of responses at the wavelengths of [`spectrum`](Self::spectrum): each times its
+    /// weight in a colour.
+    pub fn colours(responses: &[Response]) -> [Response; 3] {
+        [0, 1, 2].map(|c| Response::sum(SPECTRUM.iter().map(|w| w.3[c]).zip(responses)))
     }
 }

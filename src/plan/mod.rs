@@ -157,6 +157,17 @@ impl Plan {
         self.weights().map_or(EXACT_ERROR, Weights::predicted_error)
     }
 
+    /// The largest error on straight edges to what the profiles were fitted to: what the blurs are off by and,
+    /// on top of it, [`Profile::fit_error`].
+    pub fn stated_error(&self) -> f32 {
+        let of = |(i, profile): (usize, &Profile)| {
+            let rows = self.rows(i).iter().map(|row| row.predicted_error);
+            let blurs = if self.is_exact() { EXACT_ERROR } else { rows.fold(0.0, f32::max) };
+            blurs + profile.fit_error()
+        };
+        self.profiles.iter().enumerate().map(of).fold(0.0, f32::max)
+    }
+
     /// The pixels per mm between which the plan is of use to a profile, counted from 0: at fewer, leaving the
     /// light as it fell is within the error, too, and a host may skip the skin; at more, blurs no longer
     /// grow with the profile. None of a profile that the plan was not made for or that never blurs by more
@@ -206,7 +217,12 @@ fn check_max_error(max_error: f32) -> Result<(), Error> {
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        writeln!(f, "error {} asked for, {:.5} predicted", self.max_error, self.predicted_error())?;
+        let [predicted, stated] = [self.predicted_error(), self.stated_error()];
+        write!(f, "error {} asked for, {predicted:.5} predicted", self.max_error)?;
+        if stated > predicted {
+            write!(f, ", {stated:.5} with the profiles' own")?;
+        }
+        writeln!(f)?;
         let Some(weights) = self.weights() else {
             return writeln!(f, "the exact effect");
         };
@@ -247,6 +263,18 @@ mod tests {
                 assert!((0.02..0.3).contains(useful.start()) && *useful.end() > 376.0);
             }
         }
+    }
+
+    #[test]
+    fn what_a_profile_is_off_by_is_added() {
+        let one = crate::Gaussian { variance_mm2: 1.0, weight: [1.0; 3] };
+        let skin = Profile::SKIN.with_fit_error(0.01).unwrap();
+        let profiles = [Profile::new(&[one]).unwrap(), skin];
+        let plan = Plan::new(&profiles, 0.03).unwrap();
+        let worst = |i: usize| plan.rows(i).iter().map(|row| row.predicted_error).fold(0.0, f32::max);
+        assert_eq!(plan.stated_error(), worst(0).max(worst(1) + 0.01));
+        assert_eq!(Plan::exact(&profiles).unwrap().stated_error(), EXACT_ERROR + 0.01);
+        assert_eq!(Plan::skin().stated_error(), Plan::skin().predicted_error());
     }
 
     #[test]
