@@ -86,6 +86,9 @@ pub(super) struct Kernel<const B: usize, const P: usize> {
     pair_of: [[(usize, f64); B]; B],
 }
 
+/// Of a ray, what is not worth its sums.
+const NOTHING: f64 = 1e-7;
+
 fn cell_pair(i: usize, c: usize) -> usize {
     i * (i + 1) / 2 + c
 }
@@ -143,15 +146,22 @@ impl<const B: usize, const P: usize> Kernel<B, P> {
             put(&mut to[2], a[1] * from[0]);
             put(&mut to[3], a[1] * from[1]);
         };
+        let matters = |a: Complex| a.norm_squared() > NOTHING * NOTHING;
         for (i, ray) in rays.iter().enumerate() {
             let at = cell_pair(i, 0);
             let top = ray.top.map(|top| top * direction.fresnel);
             for (to, from) in self.mirrored[at..=at + i].iter_mut().zip(rays) {
+                if !matters(top[0] * from.top[0]) {
+                    break;
+                }
                 put_all(to, top, from.top);
             }
-            // From the nearest cell above to the furthest.
+            // From the nearest cell above to the furthest that is seen.
             let mut near = ray.parts;
             for (to, from) in self.direct[at..at + i].iter_mut().zip(rays).rev() {
+                if !matters(near[0]) {
+                    break;
+                }
                 put_all(to, near, from.parts);
                 near = near.map(|near| near * from.pass);
             }

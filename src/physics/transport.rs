@@ -16,7 +16,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use super::complex::Complex;
 use super::kernel::{Kernel, Ray, harmonics};
-use super::linear::{nnls, solve};
+use super::linear::{nnls, solve_near_one};
 use super::quadrature::{Direction, directions, fresnel, gauss, henyey_greenstein};
 use super::{Layer, Medium, Response, number};
 use crate::Error;
@@ -351,7 +351,7 @@ impl Solver {
             *k = if i % (size + 1) == 0 { 1.0 - *k } else { -*k };
         }
         let mut light = source.clone();
-        solve(&mut matrix, &mut light);
+        solve_near_one(&mut matrix, &mut light);
         let emitted = kernel.emitted(scatters);
         let leaves = |x: &[f64]| emitted.iter().zip(x).map(|(e, x)| e * x).sum::<f64>();
         let first = leaves(&source);
