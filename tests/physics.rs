@@ -8,8 +8,9 @@ use subsurface::physics::presets::{JENSEN_2001, donner_jensen_2005};
 use subsurface::physics::{
     Diffusion, Fit, Incidence, Layer, Medium, Response, Skin, Transport, single_scattering,
 };
-use subsurface::{Error, Profile};
-use subsurface_lab::truth::closed_form::scattered_step;
+use subsurface::{Error, Plan, Profile};
+use subsurface_lab::synthetic::{View, plane};
+use subsurface_lab::truth::closed_form::{scattered_step, softened, step};
 use subsurface_lab::truth::{Walk, random_walk};
 
 /// Where step edges are known.
@@ -392,6 +393,50 @@ fn a_fitted_edge_is_that_of_a_walk() {
             // The fit's error, the solver's and the walk's.
             let most = fit.edge_error[c] + 0.0005 + 3.0 * error;
             assert!((edge - value).abs() < most, "E({x}) {edge} {value} ± {error}");
+        }
+    }
+}
+
+/// From media to a fit to a plan to pixels: no step may cost more than it says.
+#[test]
+fn a_rendered_edge_is_that_of_a_walk() {
+    let white = 1.0 / 255.0;
+    for (name, media) in [("skin1", skin1(0.0)), ("three layers", donner_jensen_2005(0.0).unwrap())] {
+        let responses = Transport::default().responses(&media).unwrap();
+        let fit = Fit::within(&responses, white).unwrap();
+        let plan = Plan::new(&[fit.profile], white as f32).unwrap();
+        let stated = f64::from(plan.stated_error());
+        assert!(stated <= 2.0 * white && fit.worst() <= f64::from(fit.profile.fit_error()) + 1e-7);
+        // As many paths as bring as many back, for as little noise in blue as in red.
+        let walks: [Walk; 3] = std::array::from_fn(|c| {
+            walk(&media[c], Incidence::Normal, (100_000.0 / responses[c].albedo()) as u64)
+        });
+        let spread = walks.each_ref().map(Walk::response);
+        for px_per_mm in [2.0, 10.0] {
+            let sigma_mm = f64::recip(px_per_mm);
+            // As wide as the plan's kernels need on both sides of what is looked at.
+            let half = f64::from(fit.profile.reach_mm()) + 4.0;
+            let width = (2.0 * half * px_per_mm).ceil() as u32;
+            // As high as its widest levels need to be there.
+            let view = View::orthographic([width, 256], px_per_mm);
+            let lit = |p: glam::DVec3| glam::DVec3::splat(step(p.x, sigma_mm * sigma_mm));
+            let g = view.shoot(plane(glam::DVec3::Z, 300.0, lit));
+            let out = g.scatter_planned(&plan);
+            let row = g.pixels(|h| h.point.x.abs() < 4.0 && h.point.y > 0.0 && h.point.y < sigma_mm);
+            let mut worst = 0.0f64;
+            for (i, hit) in row {
+                for (c, walk) in walks.iter().enumerate() {
+                    let x = hit.point.x;
+                    let truth = softened(|x| spread[c].edge(x), x, sigma_mm);
+                    let noise = walk.edge(x.abs())[1].max(walk.edge(x.abs() + sigma_mm)[1]);
+                    let off = (f64::from(out[i][c]) - truth).abs();
+                    worst = worst.max(off);
+                    // The solver's own and the walk's.
+                    assert!(off < stated + 0.0005 + 3.0 * noise, "{name}: {off} at {} mm", hit.point.x);
+                }
+            }
+            println!("{name}, {px_per_mm} px/mm: {worst:.4}, {stated:.4} stated");
+            assert!(worst <= 2.0 * white, "{name}: {worst}");
         }
     }
 }

@@ -18,8 +18,12 @@ pub mod model;
 pub mod output;
 #[cfg(feature = "programs")]
 mod page;
+#[cfg(feature = "programs")]
+pub mod profile;
 pub mod renderer;
 pub mod rivals;
+#[cfg(feature = "programs")]
+pub mod specular;
 #[cfg(feature = "programs")]
 mod srgb;
 #[cfg(feature = "programs")]

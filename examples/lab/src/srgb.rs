@@ -9,7 +9,8 @@ pub fn encode(light: f32) -> u8 {
     (255.0 * encoded).round() as u8
 }
 
-fn decode(byte: u8) -> f32 {
+/// The linear light that a byte shows.
+pub fn decode(byte: u8) -> f32 {
     let encoded = f32::from(byte) / 255.0;
     if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
 }

@@ -64,7 +64,13 @@ fn view(options: Options) -> Result<(), Error> {
 
     let orbit = Camera::framing(&scene, View::Front, options.size).into();
     let about = format!("{name}, {} mm a unit\n{}", options.mm_per_unit, gpu.adapter);
-    let stage = Stage { gpu, scene, mm_per_unit: options.mm_per_unit, texture_size: options.texture_size };
+    let stage = Stage {
+        gpu,
+        scene,
+        mm_per_unit: options.mm_per_unit,
+        texture_size: options.texture_size,
+        environment: options.environment.clone(),
+    };
     // An answer that comes after the window has gone is of no use.
     let proxy = event_loop.create_proxy();
     let planner = Planner::new(move |fitted| {
@@ -80,7 +86,7 @@ fn view(options: Options) -> Result<(), Error> {
 
     let mut app = App {
         size: options.size,
-        viewer: Viewer::new(requests, planner, orbit, options.out, about),
+        viewer: Viewer::new(requests, planner, orbit, options.environment, options.out, about),
         window: None,
         result: Ok(()),
     };

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use subsurface_lab::Error;
+use subsurface_lab::renderer::Environment;
 
 const HELP: &str = "\
 A head in a window: scattered by each mode, or by two of them on the sides of a divider.
@@ -13,12 +14,14 @@ Usage: cargo run --release -p subsurface-viewer -- [OPTIONS] [FILE]
   --mm-per-unit X     length of the model's unit in mm           [1000: metres]
   --size WxH          of the window, in pixels                   [1280x800]
   --texture-size N    of the atlas of texture space, in texels   [1024]
+  --environment FILE  light from an .hdr or .exr picture of all  [three lights]
+                      directions; studio: a built-in one
   --out DIR           where screenshots go                       [out/viewer]
 
 Mouse, over the picture:
   left drag           turns the view; over the divider, moves it
   middle drag         shifts the view
-  right drag          moves the key light
+  right drag          moves the key light; turns an environment
   wheel               zooms
 
 Keys:
@@ -38,6 +41,7 @@ pub struct Options {
     pub mm_per_unit: f32,
     pub size: [u32; 2],
     pub texture_size: u32,
+    pub environment: Option<Environment>,
     pub out: PathBuf,
 }
 
@@ -51,6 +55,7 @@ impl Options {
             mm_per_unit: 1000.0,
             size: [1280, 800],
             texture_size: 1024,
+            environment: None,
             out: "out/viewer".into(),
         };
         let refused = |e: lexopt::Error| {
@@ -77,6 +82,7 @@ impl Options {
                 "mm-per-unit" => options.mm_per_unit = mm_per_unit(&text()?)?,
                 "size" => options.size = size(&text()?)?,
                 "texture-size" => options.texture_size = texture_size(&text()?)?,
+                "environment" => options.environment = Some(Environment::named(&text()?)?),
                 "out" => options.out = text()?.into(),
                 _ => return Err(refused(Long(name.as_str()).unexpected())),
             }

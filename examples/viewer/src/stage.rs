@@ -15,7 +15,8 @@ use subsurface_lab::Error;
 use subsurface_lab::method::Ours;
 use subsurface_lab::metrics;
 use subsurface_lab::renderer::{
-    AtlasRenderer, BackRenderer, Camera, Gpu, Layer as Shown, Lighting, Renderer, Scene, Timestamps,
+    AtlasRenderer, BackRenderer, Camera, Environment, Gpu, Layer as Shown, Lighting, Renderer, Scene,
+    Timestamps,
 };
 
 use crate::layer::Layer;
@@ -98,6 +99,8 @@ pub struct Stage {
     pub mm_per_unit: f32,
     /// Side of the atlas, in texels.
     pub texture_size: u32,
+    /// What is reflected where the lighting says how far it is turned.
+    pub environment: Option<Environment>,
 }
 
 impl Stage {
@@ -233,7 +236,10 @@ impl View {
 
 impl Set {
     fn new(stage: &Stage, look: &Look) -> Result<Self, Error> {
-        let renderer = Renderer::new(&stage.gpu, &stage.scene, look.size)?;
+        let mut renderer = Renderer::new(&stage.gpu, &stage.scene, look.size)?;
+        if let Some(environment) = &stage.environment {
+            renderer.set_environment(&stage.gpu, environment);
+        }
         Ok(Self {
             size: look.size,
             view: View::new(stage, &renderer, look)?,

@@ -11,7 +11,7 @@ use egui::{
 use image::RgbImage;
 use subsurface::{Gaussian, Profile};
 use subsurface_lab::Error;
-use subsurface_lab::renderer::{Lighting, Orbit, turn_light};
+use subsurface_lab::renderer::{Environment, Lighting, Orbit, turn_light};
 
 use crate::layer::{Layer, Mode};
 use crate::planner::{Planner, Wish};
@@ -50,6 +50,8 @@ pub struct Viewer {
     pub measure: bool,
     /// Times of passes are asked for with the next request.
     pub time_passes: bool,
+    /// Instead of lights, where there is one.
+    environment: Option<Environment>,
     error: Option<Error>,
     home: Controls,
     out: PathBuf,
@@ -70,16 +72,21 @@ impl Viewer {
         requests: Sender<Request>,
         planner: Planner,
         orbit: Orbit,
+        environment: Option<Environment>,
         out: PathBuf,
         about: String,
     ) -> Self {
+        let mut lighting = Lighting::default();
+        if let Some(environment) = &environment {
+            environment.light(&mut lighting, 0.0);
+        }
         let controls = Controls {
             mode: Mode::One(Layer::Screen),
             pair: [Layer::None, Layer::Screen],
             max_error: subsurface::DEFAULT_MAX_ERROR,
             profile_scale: 1.0,
             half_resolution: false,
-            lighting: Lighting::default(),
+            lighting,
             has_back: false,
             orbit,
         };
@@ -91,6 +98,7 @@ impl Viewer {
             frame: None,
             measure: false,
             time_passes: false,
+            environment,
             error: None,
             out,
             divider: 0.5,
@@ -267,10 +275,13 @@ impl Viewer {
         if response.dragged_by(PointerButton::Middle) {
             controls.orbit.shift(share.x, share.y);
         }
-        if response.dragged_by(PointerButton::Secondary)
-            && let Some(key) = controls.lighting.lights.first_mut()
-        {
-            key.direction = turn_light(key.direction, share.x, share.y);
+        if response.dragged_by(PointerButton::Secondary) {
+            if let (Some(environment), Some(turn)) = (&self.environment, controls.lighting.turn) {
+                // Half a turn across the picture.
+                environment.light(&mut controls.lighting, turn + share.x * std::f32::consts::PI);
+            } else if let Some(key) = controls.lighting.lights.first_mut() {
+                key.direction = turn_light(key.direction, share.x, share.y);
+            }
         }
         if response.hovered() {
             // Not the smoothed scroll, which would have every step in between drawn.

@@ -19,6 +19,7 @@ use crate::chart::row::Row;
 use crate::chart::scene::{Head, Scene, Surface, rgb};
 use crate::chart::score::{Knows, Score};
 use crate::chart::truths::Truths;
+use crate::chart::turning;
 use crate::method::{self, AtlasMethod, Ours, ScreenMethod};
 use crate::renderer::{AtlasRenderer, Gpu, Scene as Model};
 use crate::rivals;
@@ -59,6 +60,9 @@ const PLANNED: [u16; 3] = [50, 100, 255];
 
 /// Frames that the cost to a host's CPU is the median of.
 const HOST_FRAMES: usize = 31;
+
+/// Side of the atlas of a full convolution while the light turns.
+const TURNING_2D: u32 = 128;
 
 /// Side of the pictures in the report, at most.
 const THUMBNAIL: u32 = 256;
@@ -325,6 +329,76 @@ impl<'a> Lab<'a> {
             let of_method = std::array::from_fn(|s| times[s * count + m].as_slice());
             let name = format!("{name} {setting}");
             done.notes.push(costs::note(&name, of_method, &times[0], &scenes));
+        }
+        Ok(done)
+    }
+
+    /// Error and time while the light turns.
+    ///
+    /// # Errors
+    /// A model without skin in view.
+    pub fn turning(&self) -> Result<Done, Error> {
+        self.begin("turning: 360° in frames".into(), turning::FRAMES);
+        let device = &self.gpu.device;
+        let [.., (setting, plan)] = &self.plans[..] else {
+            return Ok(Done::default());
+        };
+        let exact = subsurface::Plan::exact(&[Profile::SKIN])?;
+        let side = self.plan.atlases[0];
+        let mut names = vec![
+            ("copy", String::new()),
+            ("screen_planned", setting.clone()),
+            ("screen_exact", String::new()),
+            ("texture_separable", side.to_string()),
+        ];
+        let mut copy = rivals::screen(device, OUTPUT, &Profile::SKIN)?;
+        copy.retain(|(name, ..)| *name == "copy");
+        let mut planned = Ours::new(device, OUTPUT, plan)?;
+        let mut exact = Ours::new(device, OUTPUT, &exact)?;
+        let mut separable = TextureSpace::new(device, OUTPUT, &[Profile::SKIN])?;
+        let mut full = rivals::atlas(device, OUTPUT, &Profile::SKIN);
+        full.retain(|(name, ..)| *name == "texture_2d");
+        let mut methods: Vec<_> =
+            copy.iter_mut().map(|(.., method)| turning::Method::Screen(method.as_mut())).collect();
+        methods.extend([
+            turning::Method::Screen(&mut planned),
+            turning::Method::Screen(&mut exact),
+            turning::Method::Atlas(&mut separable, side),
+        ]);
+        for (name, _, method) in &mut full {
+            // At the least size, or it would take hours.
+            names.push((*name, TURNING_2D.to_string()));
+            methods.push(turning::Method::Atlas(method.as_mut(), TURNING_2D));
+        }
+        let (gpu, mm) = (&self.gpu, self.options.mm_per_unit);
+        let (scene, fallen, turned) =
+            turning::figure(gpu, &self.model, mm, &self.plan, &mut methods, || self.bar.inc(1))?;
+        let mut done = Done::default();
+        done.notes.push(
+            "turning: all are held to the visible integral, texture space, too, which knows of more light."
+                .into(),
+        );
+        let copy_ms = turned.first().map_or(f64::NAN, |copy| copy.ms);
+        let none = turning::Turned { errors: fallen, ms: f64::NAN };
+        let all = [("none", String::new(), &none)].into_iter();
+        let all =
+            all.chain(names.iter().zip(&turned).map(|((name, setting), t)| (*name, setting.clone(), t)));
+        for (name, setting, turned) in all {
+            let percent = |error: f64| format!("{:.2} %", 100.0 * error);
+            done.notes.push(format!(
+                "turning: {}: {} in the first of {} frames, {} over all, {} in the worst.",
+                format!("{name} {setting}").trim_end(),
+                percent(turned.errors[0]),
+                turned.errors.len(),
+                percent(turned.rms()),
+                percent(turned.worst()),
+            ));
+            if turned.ms.is_finite() {
+                let rel_rmse_visible = (name != "copy").then(|| turned.rms());
+                let x_copy = turned.ms / copy_ms;
+                let row = empty_row(&scene, name, &setting);
+                done.rows.push(Row { ms: turned.ms, x_copy, rel_rmse_visible, ..row });
+            }
         }
         Ok(done)
     }

@@ -13,13 +13,14 @@ mod fixture;
 mod heads;
 mod lab;
 mod options;
-mod plot;
+pub(crate) mod plot;
 mod progress;
 mod report;
 mod row;
-mod scene;
+pub(crate) mod scene;
 mod score;
 pub(crate) mod truths;
+mod turning;
 
 use std::hash::{DefaultHasher, Hasher};
 use std::process::ExitCode;
@@ -64,7 +65,7 @@ fn chart(options: &Options) -> Result<(), Error> {
         return Err(Error::new("--mm-per-unit", got, format!("at most {TALLEST_MM} mm")));
     }
     let mut scenes = scene::names();
-    scenes.extend(["costs".into(), "heads".into()]);
+    scenes.extend(["turning".into(), "costs".into(), "heads".into()]);
     let scenes = chosen("--scenes", options.scenes.as_ref(), scenes)?;
     chosen("--methods", options.methods.as_ref(), METHODS.map(String::from).to_vec())?;
 
@@ -90,6 +91,7 @@ fn chart(options: &Options) -> Result<(), Error> {
                 let new = match name.as_str() {
                     "costs" => lab.costs()?,
                     "heads" => lab.heads()?,
+                    "turning" => lab.turning()?,
                     _ => lab.scene(name)?,
                 };
                 progress.keep(name, &new)?;

@@ -20,8 +20,10 @@ use subsurface::{Atlas, DEFAULT_MAX_ERROR, Frame, Plan, Profile, TextureSpace, w
 use crate::chart::truths::eq7;
 use crate::method::{self, Ours};
 use crate::metrics::{self, Layer};
+use crate::profile::Description;
 use crate::renderer::{
-    AtlasRenderer, BackRenderer, Camera, Gpu, Layer as Shown, Lighting, Probe, Renderer, Scene, View,
+    AtlasRenderer, BackRenderer, Camera, Environment, Gpu, Layer as Shown, Lighting, Probe, Renderer,
+    Scene, View,
 };
 use crate::truth::Patch;
 use crate::{output, srgb};
@@ -53,10 +55,15 @@ Usage: cargo run --release --example compare -- [OPTIONS]
   --turn X            of the camera about the head, in degrees    [0]
   --skin NAME,…       materials, meshes or nodes that are skin    [by their names]
   --not-skin NAME,…   materials, meshes or nodes that are not     [by their names]
-  --profile FILE      a diffusion profile in JSON                 [skin, six Gaussians]
+  --profile MATERIAL  light, medium, dark or another name, or a   [skin, six Gaussians]
+                      file, as `--example profile` takes them
   --max-error X       largest error of the plan, of white         [1/255]
   --mm-per-unit X     length of a scene unit in mm                [1000: metres]
-  --specular FORM     kelemen or li-shao                          [kelemen]
+  --specular FORM     kelemen, printed (Li & Shao's), blinn-phong,
+                      beckmann or ggx                             [kelemen]
+  --environment FILE  light from a picture, .hdr or .exr, of all
+                      directions; studio: a built-in one          [three lights]
+  --environment-turn X  of it, about y, in degrees                [0]
   --texture-size N    of the atlas, in texels                     [2048]
   --exposure X        of the pictures                             [1]
   --out DIR           where the report goes                       [out/compare]
@@ -72,6 +79,8 @@ struct Options {
     turn_degrees: f32,
     /// Names of what is skin, and of what is not.
     skin: [Vec<String>; 2],
+    /// What it is of, and the profile by that.
+    material: Description,
     profile: Profile,
     max_error: f32,
     mm_per_unit: f32,
@@ -79,6 +88,8 @@ struct Options {
     /// Whether screen space is shown with the layer behind, too.
     has_back: bool,
     has_eq7: bool,
+    environment: Option<Environment>,
+    environment_turn_degrees: f32,
     texture_size: u32,
     exposure: f32,
     out: PathBuf,
@@ -107,12 +118,15 @@ fn options() -> Result<Option<Options>, Error> {
         distance_mm: 600.0,
         turn_degrees: 0.0,
         skin: Default::default(),
+        material: Description::skin_of_2007(),
         profile: Profile::SKIN,
         max_error: DEFAULT_MAX_ERROR,
         mm_per_unit: 1000.0,
         lighting: Lighting::default(),
         has_back: false,
         has_eq7: false,
+        environment: None,
+        environment_turn_degrees: 0.0,
         texture_size: 2048,
         exposure: 1.0,
         out: "out/compare".into(),
@@ -148,7 +162,7 @@ fn options() -> Result<Option<Options>, Error> {
             "turn" => options.turn_degrees = number("--turn", &text()?)?,
             "skin" => options.skin[0] = names(&text()?),
             "not-skin" => options.skin[1] = names(&text()?),
-            "profile" => options.profile = profile(&text()?)?,
+            "profile" => options.material = Description::load(&text()?)?,
             "specular" => options.lighting.specular = text()?.parse()?,
             "light" => {
                 let specular = options.lighting.specular;
@@ -156,6 +170,10 @@ fn options() -> Result<Option<Options>, Error> {
             }
             "back" => options.has_back = true,
             "eq7" => options.has_eq7 = true,
+            "environment" => options.environment = Some(Environment::named(&text()?)?),
+            "environment-turn" => {
+                options.environment_turn_degrees = number("--environment-turn", &text()?)?;
+            }
             "max-error" => options.max_error = max_error(&text()?)?,
             "mm-per-unit" => options.mm_per_unit = positive("--mm-per-unit", &text()?)?,
             "exposure" => options.exposure = positive("--exposure", &text()?)?,
@@ -169,6 +187,11 @@ fn options() -> Result<Option<Options>, Error> {
                 return Err(refused(lexopt::Error::UnexpectedOption(format!("--{name}"))));
             }
         }
+    }
+    // What they depend on was perhaps said after them.
+    options.profile = options.material.profile(None, options.max_error)?;
+    if let Some(environment) = &options.environment {
+        environment.light(&mut options.lighting, options.environment_turn_degrees.to_radians());
     }
     Ok(Some(options))
 }
@@ -211,7 +234,7 @@ fn positive(input: &str, text: &str) -> Result<f32, Error> {
 }
 
 /// A number, or a fraction such as 1/255.
-fn max_error(text: &str) -> Result<f32, Error> {
+pub(crate) fn max_error(text: &str) -> Result<f32, Error> {
     let number = |text: &str| text.trim().parse::<f32>().ok();
     match text.split_once('/') {
         Some((parts, whole)) => number(parts).zip(number(whole)).map(|(p, w)| p / w),
@@ -219,12 +242,6 @@ fn max_error(text: &str) -> Result<f32, Error> {
     }
     .filter(|x| x.is_finite() && *x > 0.0)
     .ok_or_else(|| Error::new("--max-error", text, "a number above 0, such as 1/255"))
-}
-
-fn profile(path: &str) -> Result<Profile, Error> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Error::new(path, format!("\"{e}\""), "a file that can be read"))?;
-    Profile::from_json(&text).map_err(|e| Error::from(e).within(path))
 }
 
 /// A mode's scattered irradiance on the device, and what it cost.
@@ -267,6 +284,9 @@ fn compare(options: &Options) -> Result<(), Error> {
     };
     scene.choose(&options.skin[0], true, "--skin")?;
     scene.choose(&options.skin[1], false, "--not-skin")?;
+    if let Some(albedo) = options.material.albedo {
+        scene.color_skin(Vec3::from(albedo.map(|a| a as f32)));
+    }
     let gpu = Gpu::headless()?;
 
     step("scattering");
@@ -307,6 +327,12 @@ fn compare(options: &Options) -> Result<(), Error> {
             "The primitives differ: {finest:.3} to {coarsest:.3} mm a texel; the coarsest is given."
         ));
     }
+    notes.push(format!(
+        "Profile: {}, {} Gaussians, off by {:.4}, which comes on top of what a plan is off by.",
+        options.material.title,
+        options.profile.gaussians().len(),
+        options.profile.fit_error()
+    ));
     notes.extend(scene.notes());
     let report = Report {
         adapter: gpu.adapter.clone(),
@@ -351,13 +377,16 @@ impl Shot {
         size: [u32; 2],
         most_runs: usize,
     ) -> Result<Self, Error> {
-        let renderer = Renderer::new(gpu, scene, size)?;
+        let mut renderer = Renderer::new(gpu, scene, size)?;
         let distance = options.distance_mm / options.mm_per_unit;
         let camera = match options.look_at {
             Some(point) => Camera::looking_at(scene, options.view, point, distance),
             None => Camera::framing(scene, options.view, size),
         }
         .turned(options.turn_degrees.to_radians());
+        if let Some(environment) = &options.environment {
+            renderer.set_environment(gpu, environment);
+        }
         renderer.render(gpu, &camera, &options.lighting, options.mm_per_unit)?;
         let back = options.has_back.then(|| BackRenderer::new(gpu, &renderer));
         if let Some(back) = &back {

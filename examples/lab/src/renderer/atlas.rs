@@ -37,7 +37,7 @@ impl AtlasRenderer {
                 [
                     TextureSpace::VERTEX_WGSL,
                     include_str!("material.wgsl"),
-                    include_str!("lighting.wgsl"),
+                    super::lighting::SHADER,
                     include_str!("atlas.wgsl"),
                 ]
                 .concat()

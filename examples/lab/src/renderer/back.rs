@@ -24,7 +24,7 @@ impl BackRenderer {
         let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(label),
             source: wgpu::ShaderSource::Wgsl(
-                [include_str!("material.wgsl"), include_str!("lighting.wgsl"), include_str!("back.wgsl")]
+                [include_str!("material.wgsl"), super::lighting::SHADER, include_str!("back.wgsl")]
                     .concat()
                     .into(),
             ),

@@ -41,6 +41,11 @@ fn tone_map(color_in: vec3f) -> vec3f {
 fn fs_compose(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let pixel = vec2i(at.xy);
     if textureLoad(depth, pixel, 0).r == 0.0 {
+        // The environment, where there is one.
+        let background = textureLoad(specular, pixel, 0);
+        if background.a > 0.0 {
+            return vec4f(tone_map(background.rgb * compose.exposure), 1.0);
+        }
         let uv = at.xy / vec2f(textureDimensions(depth));
         let vignette = distance(uv, vec2f(0.45, 0.4));
         return vec4f(mix(vec3f(0.065, 0.068, 0.075), vec3f(0.018, 0.019, 0.022), vignette), 1.0);

@@ -6,6 +6,9 @@
 @group(3) @binding(2) var profile_id: texture_2d<u32>;
 @group(3) @binding(3) var depth: texture_2d<f32>;
 
+// How far a background is out of focus, as the slope of facets that would blur it so.
+const BACKGROUND_SLOPE: f32 = 0.1;
+
 struct Targets {
     @location(0) irradiance: vec4f,
     @location(1) specular: vec4f,
@@ -21,10 +24,15 @@ fn vs_main(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
 fn fs_lighting(@builtin(position) at: vec4f) -> Targets {
     let pixel = vec2i(at.xy);
     let z = textureLoad(depth, pixel, 0).r;
-    if z == 0.0 {
-        return Targets(vec4f(0.0), vec4f(0.0)); // reversed depth: nothing there
-    }
     let uv = at.xy / vec2f(textureDimensions(depth));
+    if z == 0.0 { // reversed depth: nothing there
+        if all(lighting.turn == vec2f(0.0)) {
+            return Targets(vec4f(0.0), vec4f(0.0));
+        }
+        let far = camera.inverse_view_projection * vec4f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, 0.5, 1.0);
+        let direction = normalize(far.xyz / far.w - camera.eye);
+        return Targets(vec4f(0.0), vec4f(from_environment(direction, BACKGROUND_SLOPE), 1.0));
+    }
     let p = camera.inverse_view_projection * vec4f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, z, 1.0);
     let world = p.xyz / p.w;
     let normal = normalize((transpose(camera.view) * vec4f(textureLoad(normals, pixel, 0).xyz, 0.0)).xyz);

@@ -6,10 +6,13 @@ use std::str::FromStr;
 
 use crate::Error;
 use bytemuck::{Pod, Zeroable};
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
 
 use super::mesh::Mesh;
 use super::{DEPTH, Gpu};
+
+/// What shaders that light surfaces begin with.
+pub(super) const SHADER: &str = concat!(include_str!("brdf.wgsl"), include_str!("lighting.wgsl"));
 
 /// Side of the shadow maps in texels.
 const MAP_SIZE: u32 = 2048;
@@ -30,24 +33,44 @@ pub struct Light {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sky(pub [Vec3; 9]);
 
-/// The form of the surface reflection.
+/// The form of the surface reflection: numbers of brdf.wgsl.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Specular {
     /// Kelemen & Szirmay-Kalos with Schlick's Fresnel term, as GPU Gems 3 ch. 14 uses it.
-    Kelemen,
+    Kelemen = 0,
     /// Li & Shao 2015, Eq. 4–6 as printed: Beckmann's distribution times the cosine, no more.
-    LiShao,
+    Printed = 1,
+    /// Blinn–Phong, normalised, with Schlick's Fresnel term.
+    BlinnPhong = 2,
+    /// Cook & Torrance: Beckmann's distribution, V-shaped grooves, Schlick's Fresnel term.
+    Beckmann = 3,
+    /// Trowbridge & Reitz's distribution with Smith's shadowing.
+    Ggx = 4,
+}
+
+impl Specular {
+    /// By their numbers.
+    pub const ALL: [Self; 5] = [Self::Kelemen, Self::Printed, Self::BlinnPhong, Self::Beckmann, Self::Ggx];
+
+    /// As options have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Kelemen => "kelemen",
+            Self::Printed => "printed",
+            Self::BlinnPhong => "blinn-phong",
+            Self::Beckmann => "beckmann",
+            Self::Ggx => "ggx",
+        }
+    }
 }
 
 impl FromStr for Specular {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self, Error> {
-        match name {
-            "kelemen" => Ok(Self::Kelemen),
-            "li-shao" => Ok(Self::LiShao),
-            _ => Err(Error::new("specular", name, "kelemen or li-shao")),
-        }
+        let found = Self::ALL.into_iter().find(|model| model.name() == name);
+        let names = || Self::ALL.map(Self::name).join(", ");
+        found.ok_or_else(|| Error::new("specular", name, format!("one of {}", names())))
     }
 }
 
@@ -62,10 +85,14 @@ pub struct Lighting {
     pub specular: Specular,
     /// RMS slope m of the skin's micro-facets, .01 to 1.
     pub slope: f32,
-    /// Intensity ρ_s of the skin's reflection (Kelemen only).
+    /// Intensity ρ_s of the skin's reflection (of all but the printed model).
     pub intensity: f32,
-    /// Reflectance at normal incidence (Kelemen only): .028 for skin.
+    /// Reflectance at normal incidence (of all but the printed model): .028 for skin.
     pub f0: f32,
+    /// How far the `Environment` that the renderer has was turned about y, in radians; none: it is neither
+    /// reflected nor behind the scene. The sky and the lights are what it lights by
+    /// (`Environment::light`).
+    pub turn: Option<f32>,
 }
 
 impl Sky {
@@ -79,27 +106,61 @@ impl Sky {
         })
     }
 
-    /// The coefficients of a sky given by its radiance from each direction (Ramamoorthi &
-    /// Hanrahan 2001, Eq. 3 and 10).
+    /// The coefficients of a sky given by its radiance from each direction.
     pub fn project(radiance: impl Fn(Vec3) -> Vec3) -> Self {
         const SAMPLES: usize = 4096;
-        // Normalisation of each basis function, and the cosine's share A_l/π of its band.
-        let y = [0.282095, 0.488603, 0.488603, 0.488603, 1.092548, 1.092548, 0.315392, 1.092548, 0.546274];
-        let a = [1.0, 2.0 / 3.0, 0.25];
-        let mut sky = [Vec3::ZERO; 9];
-        for i in 0..SAMPLES {
+        Self::sum((0..SAMPLES).map(|i| {
             // A Fibonacci spiral.
             let up = 1.0 - 2.0 * (i as f32 + 0.5) / SAMPLES as f32;
             let phi = i as f32 * PI * (3.0 - 5f32.sqrt());
             let around = (1.0 - up * up).sqrt();
             let d = Vec3::new(around * phi.cos(), up, around * phi.sin());
-            let light = radiance(d) * (4.0 * PI / SAMPLES as f32);
+            (d, radiance(d), 4.0 * PI / SAMPLES as f32)
+        }))
+    }
+
+    /// The coefficients of a sky in parts: direction, radiance, solid angle (Ramamoorthi & Hanrahan 2001,
+    /// Eq. 3 and 10).
+    pub fn sum(parts: impl Iterator<Item = (Vec3, Vec3, f32)>) -> Self {
+        // Normalisation of each basis function, and the cosine's share A_l/π of its band.
+        let y = [0.282095, 0.488603, 0.488603, 0.488603, 1.092548, 1.092548, 0.315392, 1.092548, 0.546274];
+        let a = [1.0, 2.0 / 3.0, 0.25];
+        let mut sky = [Vec3::ZERO; 9];
+        for (d, radiance, solid_angle) in parts {
+            let light = radiance * solid_angle;
             for (k, b) in basis(d).into_iter().enumerate() {
                 let band = [0, 1, 1, 1, 2, 2, 2, 2, 2][k];
                 sky[k] += light * b * y[k] * y[k] * a[band];
             }
         }
         Self(sky)
+    }
+
+    /// Irradiance/π on a surface of this normal.
+    pub fn irradiance(&self, normal: Vec3) -> Vec3 {
+        self.0.iter().zip(basis(normal)).map(|(c, b)| *c * b).sum()
+    }
+
+    /// The sky, turned: what came from d now comes from `rotation`·d. E(n) = c + b·n + nᵀQn, a number, a
+    /// vector and a symmetric matrix without a trace; b becomes Rb, and Q becomes RQRᵀ.
+    pub fn turned(&self, rotation: Mat3) -> Self {
+        let mut turned = *self;
+        for channel in 0..3 {
+            let [_, y, z, x, xy, yz, zz, xz, xxyy] = self.0.map(|c| c[channel]);
+            let b = rotation * Vec3::new(x, y, z);
+            let q = Mat3::from_cols(
+                Vec3::new(xxyy - zz, 0.5 * xy, 0.5 * xz),
+                Vec3::new(0.5 * xy, -xxyy - zz, 0.5 * yz),
+                Vec3::new(0.5 * xz, 0.5 * yz, 2.0 * zz),
+            );
+            let q = rotation * q * rotation.transpose();
+            let [x, y, z] = [q.x_axis, q.y_axis, q.z_axis];
+            let of = [b.y, b.z, b.x, 2.0 * x.y, 2.0 * y.z, 0.5 * z.z, 2.0 * x.z, 0.5 * (x.x - y.y)];
+            for (to, of) in turned.0[1..].iter_mut().zip(of) {
+                to[channel] = of;
+            }
+        }
+        turned
     }
 }
 
@@ -140,6 +201,7 @@ impl Default for Lighting {
             slope: 0.3,
             intensity: 0.32,
             f0: 0.028,
+            turn: None,
         }
     }
 }
@@ -167,7 +229,7 @@ pub(super) struct LightingUniform {
     specular_intensity: f32,
     f0: f32,
     slope: f32,
-    pad: [u32; 2],
+    turn: Vec2,
 }
 
 impl Lighting {
@@ -217,52 +279,64 @@ impl Lighting {
             sky: self.sky.0.map(|c| c.extend(0.0)),
             map_extent: extent,
             count: self.lights.len() as u32,
-            specular_model: match self.specular {
-                Specular::Kelemen => 0,
-                Specular::LiShao => 1,
-            },
+            specular_model: self.specular as u32,
             specular_intensity: self.intensity,
             f0: self.f0,
             slope: self.slope.clamp(0.01, 1.0),
-            pad: [0; 2],
+            turn: self.turn.map_or(Vec2::ZERO, Vec2::from_angle),
         })
     }
 }
 
-/// The lighting on the device: uniform, shadow maps, and the bind group that shaders read both by.
+/// The lighting on the device: uniform, shadow maps, an environment, and the bind group that shaders read
+/// all by.
 pub(super) struct Lights {
     pub layout: wgpu::BindGroupLayout,
     pub group: wgpu::BindGroup,
     uniform: wgpu::Buffer,
     maps: wgpu::Texture,
+    sampler: wgpu::Sampler,
     pipeline: wgpu::RenderPipeline,
-    map_layout: wgpu::BindGroupLayout,
+    shadows: [Shadow; Lighting::MAX_LIGHTS],
+}
+
+/// The shadow map of one light.
+struct Shadow {
+    to_clip: wgpu::Buffer,
+    group: wgpu::BindGroup,
+    map: wgpu::TextureView,
 }
 
 impl Lights {
     pub fn new(gpu: &Gpu) -> Self {
         let device = &gpu.device;
         let label = Some("subsurface_lab::renderer lighting");
+        let texture = |binding, sample_type| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty: wgpu::BindingType::Texture {
+                sample_type,
+                view_dimension: wgpu::TextureViewDimension::D2Array,
+                multisampled: false,
+            },
+            count: None,
+        };
+        let sampler = |binding, kind| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty: wgpu::BindingType::Sampler(kind),
+            count: None,
+        };
+        let filtered = wgpu::TextureSampleType::Float { filterable: true };
         let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
             label,
             entries: &[
                 super::uniform_entry(wgpu::ShaderStages::FRAGMENT),
-                wgpu::BindGroupLayoutEntry {
-                    binding: 1,
-                    visibility: wgpu::ShaderStages::FRAGMENT,
-                    ty: wgpu::BindingType::Texture {
-                        sample_type: wgpu::TextureSampleType::Depth,
-                        view_dimension: wgpu::TextureViewDimension::D2Array,
-                        multisampled: false,
-                    },
-                    count: None,
-                },
-                wgpu::BindGroupLayoutEntry {
-                    binding: 2,
-                    visibility: wgpu::ShaderStages::FRAGMENT,
-                    ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Comparison),
-                    count: None,
-                },
+                texture(1, wgpu::TextureSampleType::Depth),
+                sampler(2, wgpu::SamplerBindingType::Comparison),
+                texture(3, filtered),
+                texture(4, filtered),
+                sampler(5, wgpu::SamplerBindingType::Filtering),
             ],
         });
         let maps = device.create_texture(&wgpu::TextureDescriptor {
@@ -287,23 +361,7 @@ impl Lights {
             compare: Some(wgpu::CompareFunction::LessEqual),
             ..Default::default()
         });
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label,
-            layout: &layout,
-            entries: &[
-                wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
-                wgpu::BindGroupEntry {
-                    binding: 1,
-                    resource: wgpu::BindingResource::TextureView(&maps.create_view(
-                        &wgpu::TextureViewDescriptor {
-                            dimension: Some(wgpu::TextureViewDimension::D2Array),
-                            ..Default::default()
-                        },
-                    )),
-                },
-                wgpu::BindGroupEntry { binding: 2, resource: wgpu::BindingResource::Sampler(&sampler) },
-            ],
-        });
+        let group = group(gpu, &layout, &uniform, &maps, &sampler, &Maps::none(gpu));
 
         let label = Some("subsurface_lab::renderer shadow");
         let shader = device.create_shader_module(wgpu::include_wgsl!("shadow.wgsl"));
@@ -332,7 +390,31 @@ impl Lights {
             multiview_mask: None,
             cache: None,
         });
-        Self { layout, group, uniform, maps, pipeline, map_layout }
+        let shadow = |layer: usize| {
+            let to_clip = gpu.uniform::<Mat4>("subsurface_lab::renderer shadow");
+            Shadow {
+                group: device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label,
+                    layout: &map_layout,
+                    entries: &[wgpu::BindGroupEntry { binding: 0, resource: to_clip.as_entire_binding() }],
+                }),
+                map: maps.create_view(&wgpu::TextureViewDescriptor {
+                    dimension: Some(wgpu::TextureViewDimension::D2),
+                    base_array_layer: layer as u32,
+                    array_layer_count: Some(1),
+                    ..Default::default()
+                }),
+                to_clip,
+            }
+        };
+        let shadows = std::array::from_fn(shadow);
+        Self { layout, group, uniform, maps, sampler, pipeline, shadows }
+    }
+
+    /// Has an environment reflected from now on.
+    #[cfg(feature = "programs")]
+    pub fn set_environment(&mut self, gpu: &Gpu, environment: &Maps) {
+        self.group = group(gpu, &self.layout, &self.uniform, &self.maps, &self.sampler, environment);
     }
 
     /// Uploads the lights and draws their shadow maps.
@@ -346,34 +428,22 @@ impl Lights {
         let uniform = lighting.uniform(bounds)?;
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
         gpu.run(|encoder| {
-            for (layer, light) in uniform.lights[..uniform.count as usize].iter().enumerate() {
+            for (shadow, light) in self.shadows.iter().zip(&uniform.lights[..uniform.count as usize]) {
                 // Map coordinates to clip space: x and y from 0..1 to −1..1, y turned up.
                 let to_clip =
                     Mat4::from_cols(2.0 * Vec4::X, -2.0 * Vec4::Y, Vec4::Z, Vec4::new(-1.0, 1.0, 0.0, 1.0))
                         * light.to_map;
-                let buffer = gpu.uniform::<Mat4>("subsurface_lab::renderer shadow");
-                gpu.queue.write_buffer(&buffer, 0, bytemuck::bytes_of(&to_clip));
-                let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                    label: Some("subsurface_lab::renderer shadow"),
-                    layout: &self.map_layout,
-                    entries: &[wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() }],
-                });
-                let view = self.maps.create_view(&wgpu::TextureViewDescriptor {
-                    dimension: Some(wgpu::TextureViewDimension::D2),
-                    base_array_layer: layer as u32,
-                    array_layer_count: Some(1),
-                    ..Default::default()
-                });
+                gpu.queue.write_buffer(&shadow.to_clip, 0, bytemuck::bytes_of(&to_clip));
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                     label: Some("subsurface_lab::renderer shadow"),
                     depth_stencil_attachment: Some(super::depth_attachment(
-                        &view,
+                        &shadow.map,
                         wgpu::LoadOp::Clear(1.0),
                     )),
                     ..Default::default()
                 });
                 pass.set_pipeline(&self.pipeline);
-                pass.set_bind_group(0, &group, &[]);
+                pass.set_bind_group(0, &shadow.group, &[]);
                 for mesh in meshes {
                     mesh.draw(&mut pass, 0..mesh.index_count);
                 }
@@ -383,6 +453,80 @@ impl Lights {
     }
 }
 
+/// An environment on the device.
+pub(super) struct Maps {
+    radiance: wgpu::Texture,
+    reflectance: wgpu::Texture,
+    sampler: wgpu::Sampler,
+}
+
+impl Maps {
+    /// Of nothing.
+    fn none(gpu: &Gpu) -> Self {
+        Self::new(gpu, Self::layers(gpu, [1, 1], 1), Self::layers(gpu, [1, 1], 1))
+    }
+
+    /// Radiance by direction, in layers of slopes, and what a model reflects, in a layer each.
+    pub fn new(gpu: &Gpu, radiance: wgpu::Texture, reflectance: wgpu::Texture) -> Self {
+        // Around, and not over the poles.
+        let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("subsurface_lab::renderer environment"),
+            address_mode_u: wgpu::AddressMode::Repeat,
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..Default::default()
+        });
+        Self { radiance, reflectance, sampler }
+    }
+
+    pub fn layers(gpu: &Gpu, [width, height]: [u32; 2], layers: u32) -> wgpu::Texture {
+        gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("subsurface_lab::renderer environment"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: layers },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba16Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_DST
+                | wgpu::TextureUsages::RENDER_ATTACHMENT,
+            view_formats: &[],
+        })
+    }
+}
+
+/// What shaders that light read.
+fn group(
+    gpu: &Gpu,
+    layout: &wgpu::BindGroupLayout,
+    uniform: &wgpu::Buffer,
+    maps: &wgpu::Texture,
+    sampler: &wgpu::Sampler,
+    environment: &Maps,
+) -> wgpu::BindGroup {
+    let layers = wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        ..Default::default()
+    };
+    let resources = [
+        uniform.as_entire_binding(),
+        wgpu::BindingResource::TextureView(&maps.create_view(&layers)),
+        wgpu::BindingResource::Sampler(sampler),
+        wgpu::BindingResource::TextureView(&environment.radiance.create_view(&layers)),
+        wgpu::BindingResource::TextureView(&environment.reflectance.create_view(&layers)),
+        wgpu::BindingResource::Sampler(&environment.sampler),
+    ];
+    let entries: Vec<_> = (0..)
+        .zip(resources)
+        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
+        .collect();
+    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: Some("subsurface_lab::renderer lighting"),
+        layout,
+        entries: &entries,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -390,7 +534,7 @@ mod tests {
 
     #[test]
     fn lights_lie_as_the_shader_has_them() {
-        let shader = include_str!("lighting.wgsl");
+        let shader = SHADER;
         assert_layout!(shader, "Light", LightUniform { direction, tan_radius, color, pad, to_map });
         assert_layout!(
             shader,
@@ -403,7 +547,8 @@ mod tests {
                 specular_model,
                 specular_intensity,
                 f0,
-                slope
+                slope,
+                turn
             }
         );
     }
@@ -413,7 +558,7 @@ mod tests {
         let sky = Sky::project(|_| Vec3::ONE);
         // π of irradiance over π; 4096 samples of a constant leave rounding only.
         for n in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE.normalize()] {
-            let e: Vec3 = sky.0.iter().zip(basis(n)).map(|(c, b)| *c * b).sum();
+            let e = sky.irradiance(n);
             assert!((e - Vec3::ONE).abs().max_element() < 2e-3, "{n}: {e}");
         }
     }
@@ -421,10 +566,21 @@ mod tests {
     #[test]
     fn a_half_sky_lights_the_horizon_by_half() {
         let sky = Sky::project(|d| Vec3::splat(if d.y > 0.0 { 1.0 } else { 0.0 }));
-        let e = |n: Vec3| -> f32 { sky.0.iter().zip(basis(n)).map(|(c, b)| c.x * b).sum() };
+        let e = |n: Vec3| sky.irradiance(n).x;
         // (1 + n·y)/2 lies wholly in the first two bands.
         for n in [Vec3::X, Vec3::Y, Vec3::NEG_Y, Vec3::new(0.6, 0.8, 0.0)] {
             assert!((e(n) - (1.0 + n.y) / 2.0).abs() < 2e-3, "{n}: {}", e(n));
+        }
+    }
+
+    #[test]
+    fn a_sky_turns_with_what_it_lights() {
+        let sky = Sky::project(|d| Vec3::new(d.x, d.y * d.z, 1.0 + d.x * d.y).max(Vec3::ZERO));
+        let turn = Mat3::from_euler(glam::EulerRot::XYZ, 0.3, -2.0, 1.1);
+        let turned = sky.turned(turn);
+        for n in [Vec3::X, Vec3::NEG_Y, Vec3::new(0.6, 0.0, -0.8), Vec3::ONE.normalize()] {
+            let off = (turned.irradiance(turn * n) - sky.irradiance(n)).abs().max_element();
+            assert!(off < 1e-6, "{n}: {off}");
         }
     }
 }

@@ -1,12 +1,9 @@
-// Light on a surface: directional lights with soft shadows, a sky in spherical harmonics, and the
-// surface reflection of skin. Screen and atlas are lit by the same functions of the point alone.
+// Light on a surface: directional lights with soft shadows, a sky in spherical harmonics, the surface
+// reflection of both. Screen and atlas are lit by the same functions of the point alone. Behind brdf.wgsl.
 //
-// [LS15] Li & Shao 2015, Eq. 4–6 (Beckmann micro-facets).
-// [EL07] d'Eon & Luebke 2007, GPU Gems 3 ch. 14 (Kelemen/Szirmay-Kalos with Schlick's Fresnel).
 // [RH01] Ramamoorthi & Hanrahan 2001, "An efficient representation for irradiance environment maps".
 // [F05]  Fernando 2005, "Percentage-closer soft shadows".
-
-const PI = 3.14159265;
+// [K13]  Karis 2013, "Real shading in Unreal Engine 4": reflection of an environment in two parts.
 
 struct Light {
     // From the surface towards the light, of length 1.
@@ -27,18 +24,25 @@ struct Lighting {
     // World units across the shadow maps and along their depth.
     map_extent: f32,
     count: u32,
-    // 0: Kelemen/Szirmay-Kalos. 1: Li & Shao as printed.
+    // As brdf.wgsl names them.
     specular_model: u32,
     // Of skin: intensity ρ_s and reflectance F₀ at normal incidence.
     specular_intensity: f32,
     f0: f32,
     // Of skin: Beckmann's RMS slope m.
     slope: f32,
+    // Cosine and sine of how far the environment has turned about y; zeros without one.
+    turn: vec2f,
 }
 
 @group(2) @binding(0) var<uniform> lighting: Lighting;
 @group(2) @binding(1) var shadow_maps: texture_depth_2d_array;
 @group(2) @binding(2) var shadow_sampler: sampler_comparison;
+// Radiance of the environment by direction, blurred by facets of a slope in each layer.
+@group(2) @binding(3) var environment: texture_2d_array<f32>;
+// What a surface reflects of a uniform environment, a layer for each model: at F₀ = 1, and in Schlick's term.
+@group(2) @binding(4) var reflectance: texture_2d_array<f32>;
+@group(2) @binding(5) var environment_sampler: sampler;
 
 const BLOCKER_TAPS = 24;
 const FILTER_TAPS = 40;
@@ -110,29 +114,45 @@ struct Lit {
     specular: vec3f,
 }
 
-// [LS15] Eq. 4 and 5.
-fn beckmann(n_h: f32, m: f32) -> f32 {
-    let c2 = max(n_h * n_h, 1e-4);
-    let tan2 = (1.0 - c2) / c2;
-    return exp(-tan2 / (m * m)) / (PI * m * m * c2 * c2);
+// Reflection of one light of color 1, times cos θᵢ.
+fn reflection(n: vec3f, l: vec3f, v: vec3f, m: f32, intensity: f32) -> f32 {
+    let f = facets(lighting.specular_model, n, l, v, m);
+    // π, since a light's color is radiance reflected by white, not irradiance.
+    return PI * f.x * fresnel(lighting.specular_model, lighting.f0, intensity, f.y);
 }
 
-// Reflection of one light of color 1, times cos(n, θᵢ).
-fn reflection(n: vec3f, l: vec3f, v: vec3f, m: f32, intensity: f32) -> f32 {
-    let n_l = max(dot(n, l), 0.0);
-    let half = l + v;
-    let h = normalize(half);
-    let d = beckmann(max(dot(n, h), 0.0), m);
-    if lighting.specular_model == 1u {
-        return d * n_l; // [LS15] Eq. 6, as printed
-    }
-    let fresnel = lighting.f0 + (1.0 - lighting.f0) * pow(1.0 - max(dot(v, h), 0.0), 5.0);
-    // [EL07]; π, since a light's color is radiance reflected by white, not irradiance.
-    return PI * intensity * n_l * d * fresnel / max(dot(half, half), 1e-4);
+// The slope of layer 0 of the environment; each has twice that of the one before.
+const FIRST_SLOPE: f32 = 0.05;
+
+// Radiance of the environment from a direction, over facets of a slope; 0 without one.
+fn from_environment(direction: vec3f, m: f32) -> vec3f {
+    let turn = lighting.turn;
+    let d = vec3f(turn.x * direction.x - turn.y * direction.z, direction.y, turn.y * direction.x + turn.x * direction.z);
+    let uv = vec2f(atan2(d.x, -d.z) / (2.0 * PI) + 0.5, acos(clamp(d.y, -1.0, 1.0)) / PI);
+    let last = f32(textureNumLayers(environment)) - 1.0;
+    let layer = clamp(log2(m / FIRST_SLOPE), 0.0, last);
+    let sharp = textureSampleLevel(environment, environment_sampler, uv, u32(layer), 0.0).rgb;
+    let blurred = textureSampleLevel(environment, environment_sampler, uv, u32(min(ceil(layer), last)), 0.0).rgb;
+    return mix(sharp, blurred, fract(layer));
+}
+
+// [K13]: the environment around the mirror direction, times what the surface reflects of a uniform one.
+fn environment_reflection(n: vec3f, v: vec3f, m: f32, intensity: f32) -> vec3f {
+    let model = lighting.specular_model;
+    // Not beyond the middles of the outer texels: the sampler goes around.
+    let texel = 1.0 / vec2f(textureDimensions(reflectance));
+    let at = clamp(vec2f(dot(n, v), m), 0.5 * texel, 1.0 - 0.5 * texel);
+    let parts = textureSampleLevel(reflectance, environment_sampler, at, model, 0.0).xy;
+    // The table has Schlick's part apart.
+    let share = fresnel(model, lighting.f0, intensity, 0.0) * parts.x + fresnel(model, lighting.f0, intensity, 1.0) * parts.y;
+    return share * from_environment(reflect(-v, n), m);
 }
 
 fn lit(world: vec3f, normal: vec3f, to_eye: vec3f, m: f32, intensity: f32) -> Lit {
     var out = Lit(sky(normal), vec3f(0.0));
+    if any(lighting.turn != vec2f(0.0)) {
+        out.specular = environment_reflection(normal, to_eye, m, intensity);
+    }
     for (var i = 0u; i < lighting.count; i++) {
         let light = lighting.lights[i];
         let n_l = dot(normal, light.direction);

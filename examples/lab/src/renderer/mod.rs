@@ -9,7 +9,10 @@ mod accessor;
 mod atlas;
 mod attributes;
 mod back;
+mod brdf;
 mod camera;
+#[cfg(feature = "programs")]
+mod environment;
 mod gpu;
 mod head;
 mod lighting;
@@ -26,7 +29,10 @@ mod timestamps;
 
 pub use atlas::AtlasRenderer;
 pub use back::BackRenderer;
+pub use brdf::BrdfTables;
 pub use camera::{Camera, View};
+#[cfg(feature = "programs")]
+pub use environment::Environment;
 pub use gpu::{Gpu, Readback};
 pub use lighting::{Light, Lighting, Sky, Specular};
 pub use orbit::{Orbit, turn_light};
@@ -189,11 +195,7 @@ impl Renderer {
                 label: "subsurface_lab::renderer deferred",
                 shader: &module(
                     "subsurface_lab::renderer deferred",
-                    &[
-                        include_str!("material.wgsl"),
-                        include_str!("lighting.wgsl"),
-                        include_str!("deferred.wgsl"),
-                    ],
+                    &[include_str!("material.wgsl"), lighting::SHADER, include_str!("deferred.wgsl")],
                 ),
                 vertex: "vs_main",
                 fragment: "fs_lighting",
@@ -240,6 +242,12 @@ impl Renderer {
             compose,
             compose_uniform,
         })
+    }
+
+    /// Has an environment behind the scene and reflected in it where [`Lighting::turn`] says so.
+    #[cfg(feature = "programs")]
+    pub fn set_environment(&mut self, gpu: &Gpu, environment: &Environment) {
+        self.lights.set_environment(gpu, &environment.maps(gpu));
     }
 
     /// Draws and lights the scene into the G-buffer.

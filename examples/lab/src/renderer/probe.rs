@@ -39,7 +39,7 @@ impl Probe {
         let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(label),
             source: wgpu::ShaderSource::Wgsl(
-                [include_str!("material.wgsl"), include_str!("lighting.wgsl"), include_str!("probe.wgsl")]
+                [include_str!("material.wgsl"), super::lighting::SHADER, include_str!("probe.wgsl")]
                     .concat()
                     .into(),
             ),

@@ -5,6 +5,8 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::Error;
+#[cfg(feature = "programs")]
+use crate::srgb;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
@@ -92,6 +94,25 @@ pub struct Image {
     pub rgba8: Vec<u8>,
 }
 
+#[cfg(feature = "programs")]
+impl Image {
+    /// Its mean, as linear light.
+    fn mean(&self) -> Vec3 {
+        let mut counts = [[0u32; 256]; 3];
+        for texel in self.rgba8.chunks_exact(4) {
+            for (count, byte) in counts.iter_mut().zip(texel) {
+                count[usize::from(*byte)] += 1;
+            }
+        }
+        let pixels = (self.rgba8.len() / 4).max(1) as f32;
+        let mean = |counts: [u32; 256]| {
+            (0..=255u8).zip(counts).map(|(byte, count)| srgb::decode(byte) * count as f32).sum::<f32>()
+                / pixels
+        };
+        Vec3::from(counts.map(mean))
+    }
+}
+
 /// Everything there is to draw.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
@@ -159,6 +180,17 @@ impl Scene {
             }
         }
         Ok(())
+    }
+
+    /// Gives skin an albedo, linear RGB: in the mean over each material's texture, whose detail stays.
+    #[cfg(feature = "programs")]
+    pub fn color_skin(&mut self, albedo: Vec3) {
+        for material in self.materials.iter_mut().filter(|m| m.profile_id != 0) {
+            let mean = material.base_color_texture.map_or(Vec3::ONE, |i| self.images[i].mean());
+            // Black skin has no detail to keep.
+            let factor = albedo / mean.max(Vec3::splat(1e-3));
+            material.base_color = factor.extend(material.base_color[3]).to_array();
+        }
     }
 
     /// Where this material is among the scene's, added if it is new.

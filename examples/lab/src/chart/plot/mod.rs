@@ -1,7 +1,7 @@
 //! The charts, as drawings.
 
-mod label;
-mod panel;
+pub mod label;
+pub mod panel;
 pub mod scale;
 pub mod style;
 

@@ -109,6 +109,12 @@ impl Panel {
         }
     }
 
+    /// A line through points; what is beyond an end of an axis lies on that end.
+    pub fn line(&self, svg: &mut Svg, points: &[(f64, f64)], stroke: Stroke) {
+        let places: Vec<Point> = points.iter().map(|&point| self.place(point)).collect();
+        svg.line(&places, stroke);
+    }
+
     /// A level, named at its left (`start`) or right (`end`).
     pub fn across(&self, svg: &mut Svg, value: f64, name: &str, anchor: &str) {
         let Area { left, right, .. } = self.area;

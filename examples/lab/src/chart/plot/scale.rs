@@ -1,11 +1,12 @@
-//! Logarithmic axes: from a value to a place on the drawing.
+//! Axes: from a value to a place on the drawing.
 
-/// A logarithmic axis.
+/// An axis.
 #[derive(Clone, Copy)]
 pub struct Scale {
-    /// Decimal logarithms of the least and the greatest value.
+    /// The least and the greatest value, or their decimal logarithms.
     low: f64,
     high: f64,
+    is_linear: bool,
     /// Whether 0 is among the values: it has the lower end of the axis to itself.
     has_zero: bool,
     /// Where the ends lie on the drawing.
@@ -26,7 +27,12 @@ pub struct Tick {
 }
 
 impl Scale {
-    /// Has room for all `values` that have a logarithm, and a little more. Spans at least a decade,
+    /// A linear axis between two values, where [`over`](Self::over) makes a logarithmic one.
+    pub fn linear(low: f64, high: f64) -> Self {
+        Self { low, high, is_linear: true, has_zero: false, start: 0.0, end: 1.0 }
+    }
+
+    /// A logarithmic axis that has room for all `values` that have a logarithm, and a little more. Spans at least a decade,
     /// so that a difference that is nothing does not look like one.
     pub fn over(values: impl Iterator<Item = f64>) -> Self {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -41,7 +47,7 @@ impl Scale {
         }
         let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
         let room = (ROOM * (high - low)).max((1.0 - (high - low)) / 2.0);
-        Self { low: low - room, high: high + room, has_zero, start: 0.0, end: 1.0 }
+        Self { low: low - room, high: high + room, is_linear: false, has_zero, start: 0.0, end: 1.0 }
     }
 
     /// The same axis between two places on the drawing.
@@ -51,14 +57,26 @@ impl Scale {
 
     /// Where a value lies. What is beyond an end of the axis, as 0 is, lies on that end.
     pub fn place(&self, value: f64) -> f64 {
-        let log = value.max(f64::MIN_POSITIVE).log10();
-        let part = ((log - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
+        let at = if self.is_linear { value } else { value.max(f64::MIN_POSITIVE).log10() };
+        let part = ((at - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
         self.start + part * (self.end - self.start)
     }
 
     /// The grid: every power of ten, between them the multiples, and 0 where it is among the values.
     pub fn ticks(&self) -> Vec<Tick> {
         let span = self.high - self.low;
+        if self.is_linear {
+            // Steps of 1, 2 or 5 times a power of ten, four to ten of them.
+            let power = 10f64.powf((span / 4.0).log10().floor());
+            let step = [5.0, 2.0, 1.0].map(|s| s * power).into_iter().find(|step| span / step >= 4.0);
+            let step = step.unwrap_or(power);
+            // Rounding takes no tick off an end.
+            let steps = (self.low / step - 1e-9).ceil() as i64..=(self.high / step + 1e-9).floor() as i64;
+            let decimals = (-step.log10().floor()).max(0.0) as usize;
+            let text = |value: f64| format!("{value:.decimals$}").replace('-', "−");
+            let values = steps.map(|i| i as f64 * step);
+            return values.map(|value| Tick { value, label: Some(text(value)) }).collect();
+        }
         // Labels a decade apart where there are few, further apart where there are many.
         let step = (span / 7.0).ceil() as i32;
         let mut ticks = Vec::new();
@@ -122,6 +140,18 @@ mod tests {
         assert!(scale.place(0.1) < 100.0 && scale.place(1000.0) > 0.0);
         assert_eq!(scale.place(0.0), 100.0);
         assert_eq!(scale.place(f64::INFINITY), 0.0);
+    }
+
+    #[test]
+    fn a_linear_axis_has_its_values_at_equal_steps() {
+        let scale = Scale::linear(-0.15, 0.15).between(0.0, 300.0);
+        assert!((scale.place(0.05) - 200.0).abs() < 1e-9);
+        let ticks = scale.ticks();
+        let labels: Vec<_> = ticks.iter().filter_map(|tick| tick.label.as_deref()).collect();
+        assert_eq!(labels, ["−0.15", "−0.10", "−0.05", "0.00", "0.05", "0.10", "0.15"]);
+        for (low, high) in [(0.0, 1.0), (0.5, 1.0), (-3e4, 1e4)] {
+            assert!((4..=11).contains(&Scale::linear(low, high).ticks().len()), "{low} to {high}");
+        }
     }
 
     #[test]

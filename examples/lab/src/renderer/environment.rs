@@ -1,0 +1,383 @@
+//! Light from all around, as a picture: what it lights, and what surfaces reflect of it.
+//!
+//! - R. Ramamoorthi & P. Hanrahan, *An efficient representation for irradiance environment maps*, SIGGRAPH 2001.
+//! - P. Debevec, *A median cut algorithm for light probe sampling*, 2005: bright parts as lights of their own.
+//! - B. Karis, *Real shading in Unreal Engine 4*, 2013: reflection prefiltered by roughness.
+
+use std::f32::consts::{PI, TAU};
+use std::io::Cursor;
+use std::path::Path;
+
+use glam::{Mat3, Vec3};
+use half::f16;
+use image::{DynamicImage, ImageReader};
+use rayon::prelude::*;
+
+use super::lighting::Maps;
+use super::{BrdfTables, Gpu, Light, Lighting, Sky, Specular};
+use crate::Error;
+
+/// Pixels that are kept: 1.4° each.
+const SIZE: [u32; 2] = [256, 128];
+/// The slope of the first blurred layer, each having twice that of the one before; as in lighting.wgsl.
+const FIRST_SLOPE: f32 = 0.05;
+const LAYERS: u32 = 5;
+/// Directions that a blur sums over.
+const SAMPLES: u32 = 192;
+/// The most lights that are taken out of a picture.
+const LIGHTS: usize = 2;
+/// What is brighter than so many times the mean is of a light, within this angle of its brightest pixel.
+const LIGHT_ABOVE: f32 = 8.0;
+const LIGHT_DEGREES: f32 = 12.0;
+/// What a white surface that faces the brightest light reflects: faces are rendered about so bright.
+const BRIGHTEST: f32 = 1.1;
+
+/// A picture of the light from all around: longitudes across, from the top to the bottom; −Z is in its
+/// middle, and +X to the right of it.
+#[derive(Clone, Debug)]
+pub struct Environment {
+    /// Radiance, without what `lights` have; linear RGB.
+    texels: Vec<Vec3>,
+    sky: Sky,
+    lights: Vec<Light>,
+}
+
+impl Environment {
+    /// The built-in `studio`, or a file.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn named(name: &str) -> Result<Self, Error> {
+        match name {
+            "studio" => Ok(Self::studio()),
+            path => Self::load(Path::new(path)),
+        }
+    }
+
+    /// Reads an .hdr or .exr file, scaled to the light that faces are rendered in.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or with light that is not finite or nowhere.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let input = path.display();
+        let bytes = std::fs::read(path)
+            .map_err(|e| Error::new(&input, format!("\"{e}\""), "an .hdr or .exr file that can be read"))?;
+        let refuse = |e: &dyn std::fmt::Display| {
+            let got = e.to_string().replace('\n', " ");
+            Error::new(&input, format!("\"{got}\""), "an .hdr or .exr picture of all directions")
+        };
+        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| refuse(&e))?;
+        let picture = reader.decode().map_err(|e| refuse(&e))?;
+        if !matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)) {
+            return Err(Error::new(&input, "a picture of eight or sixteen bits", "linear light in floats"));
+        }
+        let picture = picture.into_rgb32f();
+        let size = [picture.width(), picture.height()];
+        let pixels: Vec<Vec3> = picture.pixels().map(|p| Vec3::from(p.0)).collect();
+        if let Some(i) = pixels.iter().position(|p| !p.is_finite()) {
+            let got = format!("{} in column {}, row {}", pixels[i], i as u32 % size[0], i as u32 / size[0]);
+            return Err(Error::new(&input, got, "finite numbers"));
+        }
+        Self::new(&shrunk(&pixels, size))
+            .ok_or_else(|| Error::new(&input, "no light", "a picture with light"))
+    }
+
+    /// A studio by a formula: a warm window in front to the left, a cool one behind to the right, a ceiling and
+    /// a floor.
+    pub fn studio() -> Self {
+        let window = |d: Vec3, towards: Vec3, degrees: f32| {
+            let angle = d.dot(towards.normalize()).clamp(-1.0, 1.0).acos().to_degrees();
+            1.0 - ((angle - degrees) / 1.5).clamp(0.0, 1.0)
+        };
+        let radiance = |d: Vec3| {
+            let up = Vec3::new(0.105, 0.118, 0.145);
+            let level = Vec3::new(0.075, 0.076, 0.082);
+            let down = Vec3::new(0.042, 0.036, 0.032);
+            let room =
+                if d.y > 0.0 { level.lerp(up, d.y) } else { level.lerp(down, (-3.0 * d.y).min(1.0)) };
+            let key = window(d, Vec3::new(-0.82, 0.38, 0.55), 7.0) * Vec3::new(72.0, 67.0, 61.0);
+            let rim = window(d, Vec3::new(0.80, 0.30, -0.62), 6.0) * Vec3::new(31.0, 38.0, 50.0);
+            room + key + rim
+        };
+        let texels: Vec<Vec3> = directions().map(|(d, _)| radiance(d)).collect();
+        Self::new(&texels).expect("the formula is of light")
+    }
+
+    /// None where there is no light.
+    fn new(texels: &[Vec3]) -> Option<Self> {
+        let mut texels: Vec<Vec3> = texels.iter().map(|t| t.max(Vec3::ZERO)).collect();
+        let mut lights = Vec::new();
+        for _ in 0..LIGHTS {
+            lights.extend(take_light(&mut texels));
+        }
+        let parts = directions().zip(&texels).map(|((d, solid_angle), t)| (d, *t, solid_angle));
+        let mut sky = Sky::sum(parts);
+        let lit = |n: Vec3| {
+            let direct = lights.iter().map(|l: &Light| l.color * n.dot(l.direction).max(0.0)).sum::<Vec3>();
+            luminance(direct + sky.irradiance(n))
+        };
+        let brightest = directions().map(|(d, _)| lit(d)).fold(0.0, f32::max);
+        let scale = BRIGHTEST / brightest;
+        if !scale.is_finite() {
+            return None;
+        }
+        texels.iter_mut().for_each(|t| *t *= scale);
+        lights.iter_mut().for_each(|l| l.color *= scale);
+        sky.0.iter_mut().for_each(|c| *c *= scale);
+        Some(Self { texels, sky, lights })
+    }
+
+    /// Has a scene lit by it, turned about y by so many radians. Nothing is allocated once there are as many
+    /// lights.
+    pub fn light(&self, lighting: &mut Lighting, turn: f32) {
+        let rotation = Mat3::from_rotation_y(turn);
+        lighting.sky = self.sky.turned(rotation);
+        lighting.lights.clear();
+        let turned = |light: &Light| Light { direction: rotation * light.direction, ..*light };
+        lighting.lights.extend(self.lights.iter().map(turned));
+        lighting.turn = Some(turn);
+    }
+
+    /// Itself on the device: blurred by slopes, and what each model reflects.
+    pub(super) fn maps(&self, gpu: &Gpu) -> Maps {
+        let radiance = Maps::layers(gpu, SIZE, LAYERS);
+        let mut light = self.texels.clone();
+        let mut before = 0.0;
+        for layer in 0..LAYERS {
+            // From the layer before, which leaves less to blur and no noise.
+            let slope = FIRST_SLOPE * (1 << layer) as f32;
+            light = blurred(&light, (slope * slope - before * before).sqrt());
+            before = slope;
+            let most = f16::MAX.to_f32();
+            let texel = |t: &Vec3| [t.x, t.y, t.z, 1.0].map(|c| f16::from_f32(c.min(most)).to_bits());
+            let texels: Vec<[u16; 4]> = light.iter().map(texel).collect();
+            gpu.queue.write_texture(
+                wgpu::TexelCopyTextureInfo {
+                    origin: wgpu::Origin3d { x: 0, y: 0, z: layer },
+                    ..radiance.as_image_copy()
+                },
+                bytemuck::cast_slice(&texels),
+                wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(8 * SIZE[0]),
+                    rows_per_image: None,
+                },
+                wgpu::Extent3d { width: SIZE[0], height: SIZE[1], depth_or_array_layers: 1 },
+            );
+        }
+        let reflectance = Maps::layers(gpu, BrdfTables::ALBEDO_SIZE, Specular::ALL.len() as u32);
+        let tables = BrdfTables::new(gpu);
+        for model in Specular::ALL {
+            let layer = reflectance.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2),
+                base_array_layer: model as u32,
+                array_layer_count: Some(1),
+                ..Default::default()
+            });
+            tables.draw_albedo(gpu, model, &layer);
+        }
+        Maps::new(gpu, radiance, reflectance)
+    }
+}
+
+/// Radiance from a direction, the nearest pixel's.
+fn radiance(texels: &[Vec3], d: Vec3) -> Vec3 {
+    let [width, height] = SIZE;
+    let u = d.x.atan2(-d.z) / TAU + 0.5;
+    let v = d.y.clamp(-1.0, 1.0).acos() / PI;
+    let [x, y] = [(u, width), (v, height)].map(|(at, size)| ((at * size as f32) as u32).min(size - 1));
+    texels[(y * width + x) as usize]
+}
+
+/// What facets of a slope reflect of a picture where they are seen in the direction of the mirror.
+fn blurred(texels: &[Vec3], slope: f32) -> Vec<Vec3> {
+    let directions: Vec<Vec3> = directions().map(|(d, _)| d).collect();
+    // Half vectors by Beckmann's distribution.
+    let halves: Vec<Vec3> = (0..SAMPLES)
+        .map(|i| {
+            let u = (i as f32 + 0.5) / SAMPLES as f32;
+            let phi = TAU * (i.reverse_bits() as f32 * 2f32.powi(-32));
+            let tan = slope * (-(1.0 - u).ln()).sqrt();
+            let cos = (1.0 + tan * tan).sqrt().recip();
+            Vec3::new(tan * cos * phi.cos(), tan * cos * phi.sin(), cos)
+        })
+        .collect();
+    let blurred = directions.par_iter().map(|n| {
+        let right = n.any_orthonormal_vector();
+        let up = n.cross(right);
+        let (mut sum, mut mass) = (Vec3::ZERO, 0.0);
+        for h in &halves {
+            let h = h.x * right + h.y * up + h.z * *n;
+            let l = 2.0 * n.dot(h) * h - *n;
+            let cos = l.dot(*n);
+            if cos > 0.0 {
+                sum += cos * radiance(texels, l);
+                mass += cos;
+            }
+        }
+        sum / mass
+    });
+    blurred.collect()
+}
+
+/// Directions of the pixels, row by row, and the solid angle of each.
+fn directions() -> impl Iterator<Item = (Vec3, f32)> {
+    let [width, height] = SIZE;
+    (0..width * height).map(move |i| {
+        let phi = TAU * (((i % width) as f32 + 0.5) / width as f32 - 0.5);
+        let theta = PI * ((i / width) as f32 + 0.5) / height as f32;
+        let half = 0.5 * PI / height as f32;
+        let solid_angle = TAU / width as f32 * 2.0 * theta.sin() * half.sin();
+        (Vec3::new(theta.sin() * phi.sin(), theta.cos(), -theta.sin() * phi.cos()), solid_angle)
+    })
+}
+
+/// Means over pixels of [`SIZE`], of pictures that are larger; the nearest pixels of others.
+fn shrunk(pixels: &[Vec3], size: [u32; 2]) -> Vec<Vec3> {
+    let range = |i: u32, axis: usize| {
+        let at = |i: u32| (u64::from(i) * u64::from(size[axis]) / u64::from(SIZE[axis])) as u32;
+        at(i)..at(i + 1).max(at(i) + 1)
+    };
+    let texel = |i: u32| {
+        let (columns, rows) = (range(i % SIZE[0], 0), range(i / SIZE[0], 1));
+        let count = columns.len() * rows.len();
+        let row = |y: u32| columns.clone().map(move |x| pixels[(y * size[0] + x) as usize]).sum::<Vec3>();
+        rows.map(row).sum::<Vec3>() / count as f32
+    };
+    (0..SIZE[0] * SIZE[1]).map(texel).collect()
+}
+
+fn luminance(light: Vec3) -> f32 {
+    light.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
+
+/// Takes the brightest light out of a picture, if there is one that matters: one with a shadow of its own.
+fn take_light(texels: &mut [Vec3]) -> Option<Light> {
+    let directions: Vec<(Vec3, f32)> = directions().collect();
+    let mean =
+        directions.iter().zip(&*texels).map(|((_, w), t)| w * luminance(*t)).sum::<f32>() / (4.0 * PI);
+    let most = LIGHT_ABOVE * mean;
+    let brightest =
+        (0..texels.len()).max_by(|a, b| luminance(texels[*a]).total_cmp(&luminance(texels[*b])))?;
+    let near = LIGHT_DEGREES.to_radians().cos();
+    // Around a direction: its power, where that comes from, and the picture without it.
+    let take = |middle: Vec3| {
+        let (mut power, mut towards) = (Vec3::ZERO, Vec3::ZERO);
+        let left = directions.iter().zip(&*texels).map(|((d, solid_angle), texel)| {
+            let bright = luminance(*texel);
+            let share = if bright > most && d.dot(middle) > near { 1.0 - most / bright } else { 0.0 };
+            let taken = share * *texel;
+            power += taken * *solid_angle;
+            towards += luminance(taken * *solid_angle) * *d;
+            *texel - taken
+        });
+        let left: Vec<Vec3> = left.collect();
+        (power, towards, left)
+    };
+    // The brightest pixel may lie at the rim.
+    let mut direction = directions[brightest].0;
+    for _ in 0..3 {
+        direction = take(direction).1.try_normalize()?;
+    }
+    let (power, towards, left) = take(direction);
+    // How far it is spread: a disc of radius ρ has a mean of 1 − cos of ρ²/4.
+    let spread = 1.0 - towards.length() / luminance(power);
+    let color = power / PI;
+    // A tenth of what the rest lights by.
+    if luminance(color) < 0.1 * mean {
+        return None;
+    }
+    texels.copy_from_slice(&left);
+    let radius_degrees = (4.0 * spread.max(0.0)).sqrt().to_degrees().clamp(0.3, 10.0);
+    Some(Light { direction, radius_degrees, color })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Irradiance/π by all pixels, lights included.
+    fn lit(environment: &Environment, n: Vec3) -> Vec3 {
+        let direct = environment.lights.iter().map(|l| l.color * n.dot(l.direction).max(0.0)).sum::<Vec3>();
+        direct + environment.sky.irradiance(n)
+    }
+
+    #[test]
+    fn a_picture_lights_as_its_pixels_do() {
+        // A smooth picture has no lights in it; one with a lamp has one, where it is and as strong.
+        let smooth: Vec<Vec3> = directions().map(|(d, _)| Vec3::splat(1.0 + 0.5 * d.y)).collect();
+        let environment = Environment::new(&smooth).unwrap();
+        assert!(environment.lights.is_empty());
+        // Irradiance/π of 1 + y/2 is 1 + y/3.
+        let [up, side] = [Vec3::Y, Vec3::X].map(|n| lit(&environment, n).x);
+        assert!((up / side - 4.0 / 3.0).abs() < 1e-3 && (up - BRIGHTEST).abs() < 1e-3, "{up} {side}");
+
+        let towards = Vec3::new(0.3, 0.5, -0.8).normalize();
+        let lamp = |d: Vec3| if d.dot(towards) > 5f32.to_radians().cos() { 500.0 } else { 0.0 };
+        let texels: Vec<Vec3> = directions().map(|(d, _)| Vec3::splat(1.0 + lamp(d))).collect();
+        let environment = Environment::new(&texels).unwrap();
+        let [light] = environment.lights[..] else { panic!("{:?}", environment.lights) };
+        assert!(light.direction.dot(towards) > 0.5f32.to_radians().cos());
+        assert!((light.radius_degrees - 5.0).abs() < 0.3, "{}", light.radius_degrees);
+        // 500 sin² 5° over the room's 1.
+        let [facing, away] = [towards, -towards].map(|n| lit(&environment, n).x);
+        let expected = 1.0 + 500.0 * 5f32.to_radians().sin().powi(2);
+        // Pixels of 1.4° make a disc of 5° up to a twentieth too large or small.
+        assert!((facing / away / expected - 1.0).abs() < 0.05, "{} {expected}", facing / away);
+    }
+
+    #[test]
+    fn the_studio_is_lit_from_where_the_portrait_is() {
+        let studio = Environment::studio();
+        let portrait = Lighting::default();
+        assert_eq!(studio.lights.len(), portrait.lights.len());
+        for (light, known) in studio.lights.iter().zip(&portrait.lights) {
+            assert!(light.direction.dot(known.direction.normalize()) > 0.999, "{light:?} {known:?}");
+            assert!((light.color / known.color - 1.0).abs().max_element() < 0.25, "{light:?} {known:?}");
+        }
+    }
+
+    #[test]
+    fn what_turns_by_a_whole_circle_comes_back() {
+        let studio = Environment::studio();
+        let mut lighting = Lighting::default();
+        studio.light(&mut lighting, 0.0);
+        let first = lighting.clone();
+        let capacity = lighting.lights.capacity();
+        for i in 1..=100 {
+            studio.light(&mut lighting, i as f32 / 100.0 * TAU);
+        }
+        assert_eq!(capacity, lighting.lights.capacity());
+        for (a, b) in lighting.lights.iter().zip(&first.lights) {
+            assert!((a.direction - b.direction).abs().max_element() < 1e-5);
+        }
+        for n in [Vec3::X, Vec3::NEG_Z, Vec3::ONE.normalize()] {
+            assert!((lighting.sky.irradiance(n) - first.sky.irradiance(n)).abs().max_element() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn blurring_keeps_what_is_the_same_all_around() {
+        let even = Environment::new(&vec![Vec3::splat(2.0); (SIZE[0] * SIZE[1]) as usize]).unwrap();
+        for slope in [0.05, 0.8] {
+            for texel in blurred(&even.texels, slope) {
+                assert!((texel - BRIGHTEST).abs().max_element() < 1e-3, "{slope}: {texel}");
+            }
+        }
+    }
+
+    #[test]
+    fn pictures_of_any_size_are_taken() {
+        for size in [[1, 1], [3, 2], [1000, 700]] {
+            let pixels = vec![Vec3::ONE; (size[0] * size[1]) as usize];
+            assert!(shrunk(&pixels, size).iter().all(|t| (*t - 1.0).abs().max_element() < 1e-5));
+        }
+        assert!(Environment::new(&vec![Vec3::ZERO; (SIZE[0] * SIZE[1]) as usize]).is_none());
+    }
+
+    #[test]
+    fn files_that_are_no_pictures_of_light_are_named() {
+        let error = Environment::load(Path::new("no-such.hdr")).unwrap_err().to_string();
+        assert!(error.starts_with("no-such.hdr: got"), "{error}");
+    }
+}
