@@ -4,7 +4,7 @@
 //! Add [`SubsurfacePlugin`], [`SubsurfaceScattering`] to a camera and [`SubsurfaceProfile`] to the meshes
 //! that are skin:
 //!
-//! ```
+//! ```no_run
 //! use bevy::prelude::*;
 //! use subsurface_bevy::{SubsurfacePlugin, SubsurfaceProfile, SubsurfaceScattering};
 //!
@@ -23,8 +23,9 @@
 //!
 //! App::new()
 //!     .insert_resource(bevy::pbr::DefaultOpaqueRendererMethod::deferred())
-//!     .add_plugins(SubsurfacePlugin)
-//!     .add_systems(Startup, setup);
+//!     .add_plugins((DefaultPlugins, SubsurfacePlugin))
+//!     .add_systems(Startup, setup)
+//!     .run();
 //! ```
 //!
 //! # How a frame is drawn

@@ -147,7 +147,7 @@ fn the_first_frame_waits_for_nothing() {
     // What the driver and Bevy make once for all.
     first_frames(true);
     let (mut plain, mut with) = (Vec::new(), Vec::new());
-    for _ in 0..5 {
+    for _ in 0..8 {
         plain.push(first_frames(false));
         with.push(first_frames(true));
     }
