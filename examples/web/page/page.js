@@ -1,7 +1,7 @@
 // The controls of the page, and its chart. All that draws or measures is in the wasm beside it (src/lib.rs).
 //
-// In the address: ?size=512x512 fixes the canvas's pixels, ?atlas=512 the texels of texture space, ?rounds=3 how
-// often the chart times each method.
+// In the address: ?size=512x512 fixes the canvas's pixels, ?atlas=512 the texels of texture space, ?rounds=3
+// how often the chart times each method.
 
 import init, { Mode, Page, Show } from "./subsurface_web.js";
 
@@ -14,11 +14,18 @@ const MODES = {
 const SHOWS = {
   "the picture": [Show.Picture, ""],
   "diffuse light, no albedo": [Show.Diffuse, ""],
-  "pixels per mm": [Show.PxPerMm,
-    "Of a surface that faces the camera: blue up to 0.25, cyan to 1, green to 4, yellow to 16, red beyond."],
-  "levels of the plan": [Show.Level, "The coarsest level that a pixel is blurred at: dark blue, the frame itself, to red."],
-  "kinds of tiles": [Show.Class,
-    "How the plan blurs: green, as planar surfaces; yellow, by the depth of each pixel; red, each pixel by its own sum."],
+  "pixels per mm": [
+    Show.PxPerMm,
+    "Of a surface that faces the camera: blue up to 0.25, cyan to 1, green to 4, yellow to 16, red beyond.",
+  ],
+  "levels of the plan": [
+    Show.Level,
+    "The coarsest level that a pixel is blurred at: dark blue, the frame itself, to red.",
+  ],
+  "kinds of tiles": [
+    Show.Class,
+    "Green: blurred as planar surfaces; yellow: by the depth of each pixel; red: each pixel by its own sum.",
+  ],
 };
 // As in the lab's chart (examples/lab/src/chart/plot/style.rs), on a dark ground.
 const METHODS = {
@@ -38,7 +45,14 @@ const ROUNDS = 5;
 const id = (name) => document.getElementById(name);
 const address = new URLSearchParams(location.search);
 const canvas = id("canvas");
-const state = { left: Mode.None, right: Mode.Screen, divider: 0.5, show: Show.Picture, frames: 0, isBusy: false };
+const state = {
+  left: Mode.None,
+  right: Mode.Screen,
+  divider: 0.5,
+  show: Show.Picture,
+  frames: 0,
+  isBusy: false,
+};
 let page, profile, chart;
 
 function say(text, isError = false) {
@@ -48,16 +62,19 @@ function say(text, isError = false) {
 const fail = (error) => say(error.message ?? String(error), true);
 
 /// Does something, and says what is wrong with it if it cannot be done.
-const attempt = (work) => async (...given) => {
-  try {
-    await work(...given);
-  } catch (error) {
-    fail(error);
-  }
-};
+const attempt =
+  (work) =>
+  async (...given) => {
+    try {
+      await work(...given);
+    } catch (error) {
+      fail(error);
+    }
+  };
 
 // Frames are drawn when something was asked for, one at a time; then the page rests.
-let isWanted = false, isDrawing = false;
+let isWanted = false,
+  isDrawing = false;
 const draw = attempt(async () => {
   isWanted = true;
   if (isDrawing || !page) return;
@@ -77,18 +94,19 @@ const draw = attempt(async () => {
 });
 
 /// Says what is done, lets the browser show it, and does it.
-const slowly = (text, work) => attempt(async () => {
-  if (state.isBusy) return;
-  state.isBusy = true;
-  say(text);
-  try {
-    await new Promise((resume) => setTimeout(resume, 50));
-    await work();
-    if (id("message").textContent === text) say("");
-  } finally {
-    state.isBusy = false;
-  }
-})();
+const slowly = (text, work) =>
+  attempt(async () => {
+    if (state.isBusy) return;
+    state.isBusy = true;
+    say(text);
+    try {
+      await new Promise((resume) => setTimeout(resume, 50));
+      await work();
+      if (id("message").textContent === text) say("");
+    } finally {
+      state.isBusy = false;
+    }
+  })();
 
 // The canvas.
 
@@ -158,11 +176,15 @@ for (const end of ["pointerup", "pointercancel"]) {
   canvas.addEventListener(end, (event) => pointers.delete(event.pointerId));
 }
 canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-canvas.addEventListener("wheel", (event) => {
-  event.preventDefault();
-  page?.zoom(-event.deltaY / (event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? 100 : 3));
-  draw();
-}, { passive: false });
+canvas.addEventListener(
+  "wheel",
+  (event) => {
+    event.preventDefault();
+    page?.zoom(-event.deltaY / (event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? 100 : 3));
+    draw();
+  },
+  { passive: false },
+);
 
 id("divider").addEventListener("pointerdown", (event) => id("divider").setPointerCapture(event.pointerId));
 id("divider").addEventListener("pointermove", (event) => {
@@ -178,7 +200,9 @@ id("divider").addEventListener("keydown", (event) => {
 // The panel.
 
 function choices(select, names, chosen, take) {
-  id(select).replaceChildren(...names.map((name) => new Option(name, name, name === chosen, name === chosen)));
+  id(select).replaceChildren(
+    ...names.map((name) => new Option(name, name, name === chosen, name === chosen)),
+  );
   id(select).addEventListener("change", () => take(id(select).value));
 }
 
@@ -203,19 +227,22 @@ function values() {
   id("profile-name").textContent = profile?.name ?? "";
 }
 
-const plan = (wanted = profile) => slowly("Fitting a plan…", async () => {
-  page.plan(wanted.gaussians, 2 ** id("scale").valueAsNumber, Math.fround(maxError()));
-  profile = wanted;
-  values();
-  await draw();
-});
+const plan = (wanted = profile) =>
+  slowly("Fitting a plan…", async () => {
+    page.plan(wanted.gaussians, 2 ** id("scale").valueAsNumber, Math.fround(maxError()));
+    profile = wanted;
+    values();
+    await draw();
+  });
 
 /// A profile as Profile::from_json reads it: of each Gaussian the variance and three weights.
 function gaussians(name, text) {
   let terms;
   try {
     terms = JSON.parse(text).gaussians.map((g) => [g.variance_mm2, ...g.weight]);
-  } catch { /* told below */ }
+  } catch {
+    /* told below */
+  }
   if (!terms?.every((term) => term.length === 4 && term.every(Number.isFinite))) {
     throw new Error(`${name}: needs {"gaussians": [{"variance_mm2": v, "weight": [r, g, b]}, …]}`);
   }
@@ -242,7 +269,8 @@ const number = (value, digits = 3) => Number(value.toPrecision(digits)).toString
 
 /// All of a bench's figures; `step` is told how far it got.
 async function figures(bench, rounds, step) {
-  const rows = [], unavailable = [];
+  const rows = [],
+    unavailable = [];
   const steps = bench.length * (rounds + 1);
   let done = 0;
   for (let i = 0; i < bench.length; i++) {
@@ -253,13 +281,13 @@ async function figures(bench, rounds, step) {
     } catch (error) {
       unavailable.push({ method: row.method, why: error.message });
     }
-    step(done += 1, steps, row.method);
+    step((done += 1), steps, row.method);
   }
   // In turn, there and back, so that a clock that drifts drifts for all.
   for (let round = 0; round < rounds; round++) {
     for (const row of round % 2 ? rows.toReversed() : rows) {
       row.ms_of_rounds.push(await bench.ms(row.i));
-      step(done += 1, steps, row.method);
+      step((done += 1), steps, row.method);
     }
   }
   for (const row of rows) {
@@ -278,41 +306,52 @@ const color = ({ method }) => METHODS[method]?.[1] ?? "#aaa";
 function table({ rows, unavailable }, size) {
   const cells = (tag, list) => `<tr>${list.map((text) => `<${tag}>${text}</${tag}>`).join("")}</tr>`;
   const name = (row) => `<i style="background:${color(row)}"></i>${titled(row)}`;
-  return cells("th", [size.join("×"), "ms", "rel. RMSE", "largest error"])
-    + rows.map((row) => cells("td", [
-      name(row), number(row.ms), `${number(100 * row.rel_rmse)} %`, number(row.max_error, 2)])).join("")
-    + unavailable.map((row) => cells("td", [name({ setting: "", ...row }), "–", "–", "–"])).join("");
+  return (
+    cells("th", [size.join("×"), "ms", "rel. RMSE", "largest error"]) +
+    rows
+      .map((row) =>
+        cells("td", [name(row), number(row.ms), `${number(100 * row.rel_rmse)} %`, number(row.max_error, 2)]),
+      )
+      .join("") +
+    unavailable.map((row) => cells("td", [name({ setting: "", ...row }), "–", "–", "–"])).join("")
+  );
 }
 
-const measure = () => slowly("Measuring this view…", async () => {
-  const size = [canvas.width, canvas.height];
-  const result = await figures(await page.measure(), Number(address.get("rounds") ?? 3), () => {});
-  id("measured").innerHTML = table(result, size);
-});
+const measure = () =>
+  slowly("Measuring this view…", async () => {
+    const size = [canvas.width, canvas.height];
+    const result = await figures(await page.measure(), Number(address.get("rounds") ?? 3), () => {});
+    id("measured").innerHTML = table(result, size);
+  });
 
-const runChart = () => slowly("Timing every method…", async () => {
-  const [width, height] = id("chart-size").value.split("×").map(Number);
-  const rounds = Number(address.get("rounds") ?? ROUNDS);
-  id("progress").removeAttribute("value");
-  id("progress").hidden = false;
-  try {
-    const bench = await page.chart(width, height);
-    const result = await figures(bench, rounds, (done, steps, name) => {
-      [id("progress").value, id("progress").max] = [done, steps];
-      say(`Timing every method: ${titled({ method: name, setting: "" })}`);
-    });
-    chart = {
-      what: "subsurface, built-in head from the front, skin; errors against the exact sum",
-      adapter: state.adapter, browser: navigator.userAgent, size: [width, height], rounds, ...result,
-    };
-    id("plot").innerHTML = plot(chart);
-    id("charted").innerHTML = table(chart, [width, height]);
-    id("copy").disabled = false;
-    say("");
-  } finally {
-    id("progress").hidden = true;
-  }
-});
+const runChart = () =>
+  slowly("Timing every method…", async () => {
+    const [width, height] = id("chart-size").value.split("×").map(Number);
+    const rounds = Number(address.get("rounds") ?? ROUNDS);
+    id("progress").removeAttribute("value");
+    id("progress").hidden = false;
+    try {
+      const bench = await page.chart(width, height);
+      const result = await figures(bench, rounds, (done, steps, name) => {
+        [id("progress").value, id("progress").max] = [done, steps];
+        say(`Timing every method: ${titled({ method: name, setting: "" })}`);
+      });
+      chart = {
+        what: "subsurface, built-in head from the front, skin; errors against the exact sum",
+        adapter: state.adapter,
+        browser: navigator.userAgent,
+        size: [width, height],
+        rounds,
+        ...result,
+      };
+      id("plot").innerHTML = plot(chart);
+      id("charted").innerHTML = table(chart, [width, height]);
+      id("copy").disabled = false;
+      say("");
+    } finally {
+      id("progress").hidden = true;
+    }
+  });
 
 /// Error against time, both on logarithmic scales, as SVG.
 function plot({ rows, size }) {
@@ -322,7 +361,8 @@ function plot({ rows, size }) {
   const range = (list) => [0.8 * Math.min(...list), 1.25 * Math.max(...list)];
   const x = range(rows.filter((row) => row.method !== "none").map((row) => row.ms));
   const y = range([known("none"), ...points].map((row) => 100 * row.rel_rmse));
-  const at = ([low, high], value, from, to) => from + (to - from) * Math.log(value / low) / Math.log(high / low);
+  const at = ([low, high], value, from, to) =>
+    from + ((to - from) * Math.log(value / low)) / Math.log(high / low);
   const px = (row) => at(x, row.ms, left, W - right);
   const py = (row) => at(y, 100 * row.rel_rmse, H - bottom, top);
   const ticks = ([low, high]) => {
@@ -339,40 +379,60 @@ function plot({ rows, size }) {
   const parts = [
     ...ticks(x).map((tick) => {
       const across = px({ ms: tick });
-      return line(across, top, across, H - bottom, 'stroke="#333"')
-        + text(across, H - bottom + 13, number(tick), 'text-anchor="middle"');
+      return (
+        line(across, top, across, H - bottom, 'stroke="#333"') +
+        text(across, H - bottom + 13, number(tick), 'text-anchor="middle"')
+      );
     }),
     ...ticks(y).map((tick) => {
       const up = py({ rel_rmse: tick / 100 });
-      return line(left, up, W - right, up, 'stroke="#333"') + text(left - 4, up + 4, `${number(tick)} %`, 'text-anchor="end"');
+      return (
+        line(left, up, W - right, up, 'stroke="#333"') +
+        text(left - 4, up + 4, `${number(tick)} %`, 'text-anchor="end"')
+      );
     }),
     text((left + W - right) / 2, H - 6, `ms at ${size.join("×")}`, 'text-anchor="middle"'),
     text(4, 11, "relative RMSE to the exact sum; lower left is better"),
   ];
   const none = py(known("none"));
-  parts.push(line(left, none, W - right, none, dashed(known("none"))), text(left + 3, none - 4, "no scattering"));
+  parts.push(
+    line(left, none, W - right, none, dashed(known("none"))),
+    text(left + 3, none - 4, "no scattering"),
+  );
   for (const row of ["copy", "screen_exact"].map(known)) {
     const across = px(row);
-    parts.push(line(across, top, across, H - bottom, dashed(row)),
-      text(across - 4, H - bottom - 5, row.method === "copy" ? "copy" : "exact sum",
-        `transform="rotate(-90 ${across - 4} ${H - bottom - 5})"`));
+    parts.push(
+      line(across, top, across, H - bottom, dashed(row)),
+      text(
+        across - 4,
+        H - bottom - 5,
+        row.method === "copy" ? "copy" : "exact sum",
+        `transform="rotate(-90 ${across - 4} ${H - bottom - 5})"`,
+      ),
+    );
   }
   for (const method of new Set(points.map((row) => row.method))) {
     const own = points.filter((row) => row.method === method);
     const spots = own.map((row) => [px(row), py(row)]);
     parts.push(`<polyline points="${spots.join(" ")}" fill="none" stroke="${color(own[0])}"/>`);
     spots.forEach(([x, y], i) =>
-      parts.push(`<circle cx="${x}" cy="${y}" r="4" fill="${color(own[i])}"><title>${titled(own[i])}</title></circle>`));
+      parts.push(
+        `<circle cx="${x}" cy="${y}" r="4" fill="${color(own[i])}"><title>${titled(own[i])}</title></circle>`,
+      ),
+    );
   }
-  return `<svg viewBox="0 0 ${W} ${H}" font-size="10.5" font-family="system-ui, sans-serif">${parts.join("")}</svg>`;
+  const font = 'font-size="10.5" font-family="system-ui, sans-serif"';
+  return `<svg viewBox="0 0 ${W} ${H}" ${font}>${parts.join("")}</svg>`;
 }
 
 // From here on it starts.
 
 const start = attempt(async () => {
   if (!navigator.gpu) {
-    throw new Error("This browser has no WebGPU, which the page needs: Chrome or Edge 113, Safari 26, Firefox 141 "
-      + "on Windows, or later. It is there on https and localhost only.");
+    throw new Error(
+      "This browser has no WebGPU, which the page needs: Chrome or Edge 113, Safari 26, Firefox 141 " +
+        "on Windows, or later. It is there on https and localhost only.",
+    );
   }
   const adapter = await navigator.gpu.requestAdapter({ powerPreference: "high-performance" });
   if (!adapter) throw new Error("This browser has WebGPU, but no GPU that it lets pages use.");
@@ -404,11 +464,17 @@ const start = attempt(async () => {
   });
   id("measure").addEventListener("click", measure);
   id("chart").addEventListener("click", runChart);
-  id("copy").addEventListener("click", attempt(() => navigator.clipboard.writeText(JSON.stringify(chart, null, 1))));
+  id("copy").addEventListener(
+    "click",
+    attempt(() => navigator.clipboard.writeText(JSON.stringify(chart, null, 1))),
+  );
   for (const event of ["dragover", "drop"]) addEventListener(event, (e) => e.preventDefault());
-  addEventListener("drop", attempt(async ({ dataTransfer }) => {
-    for (const file of dataTransfer.files) await take(file);
-  }));
+  addEventListener(
+    "drop",
+    attempt(async ({ dataTransfer }) => {
+      for (const file of dataTransfer.files) await take(file);
+    }),
+  );
 
   await init();
   const [width, height] = pixels();
@@ -433,5 +499,13 @@ const start = attempt(async () => {
 });
 
 // For the console, and the test.
-globalThis.subsurface = { state, get page() { return page; }, get chart() { return chart; } };
+globalThis.subsurface = {
+  state,
+  get page() {
+    return page;
+  },
+  get chart() {
+    return chart;
+  },
+};
 start();

@@ -1,7 +1,8 @@
-// Opens the page in headless Chromium and does what people do: node test/browser.mjs PAGE NATIVE PLAYWRIGHT [SHOT]
+// Opens the page in headless Chromium and does what people do:
+// node test/browser.mjs PAGE NATIVE PLAYWRIGHT [SHOT]
 //
-// PAGE is the built page; NATIVE, what `compare --size 256x256 --texture-size 512` wrote; PLAYWRIGHT, the folder that
-// playwright-core is installed in; SHOT, a JPEG of the page to be written.
+// PAGE is the built page; NATIVE, what `compare --size 256x256 --texture-size 512` wrote; PLAYWRIGHT, the
+// folder that playwright-core is installed in; SHOT, a JPEG of the page to be written.
 
 import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
@@ -11,7 +12,12 @@ import { extname, join, normalize } from "node:path";
 
 const [root, native, playwright, shot] = process.argv.slice(2);
 const { chromium } = createRequire(join(playwright, "x"))("playwright-core");
-const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".wasm": "application/wasm" };
+const TYPES = {
+  ".html": "text/html",
+  ".js": "text/javascript",
+  ".css": "text/css",
+  ".wasm": "application/wasm",
+};
 // A software driver compiles and draws for seconds.
 const PATIENCE_MS = 240_000;
 // Pictures are drawn at twice the size of the native ones, which are anti-aliased so.
@@ -27,7 +33,9 @@ const server = createServer(async (request, response) => {
   const path = normalize(new URL(request.url, "http://localhost").pathname);
   try {
     const body = await readFile(join(root, path === "/" ? "index.html" : path));
-    response.writeHead(200, { "content-type": TYPES[extname(path === "/" ? ".html" : path)] ?? "text/html" }).end(body);
+    response
+      .writeHead(200, { "content-type": TYPES[extname(path === "/" ? ".html" : path)] ?? "text/html" })
+      .end(body);
   } catch {
     response.writeHead(404).end();
   }
@@ -37,8 +45,15 @@ const address = `http://127.0.0.1:${server.address().port}/`;
 
 const browser = await chromium.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--disable-background-networking", "--enable-unsafe-webgpu", "--enable-features=Vulkan",
-    "--use-vulkan=swiftshader", "--use-angle=swiftshader", "--use-webgpu-adapter=swiftshader"],
+  args: [
+    "--no-sandbox",
+    "--disable-background-networking",
+    "--enable-unsafe-webgpu",
+    "--enable-features=Vulkan",
+    "--use-vulkan=swiftshader",
+    "--use-angle=swiftshader",
+    "--use-webgpu-adapter=swiftshader",
+  ],
 });
 
 const complaints = [];
@@ -55,7 +70,8 @@ async function open(query, viewport, before = () => {}) {
   page.on("pageerror", (error) => complaints.push(error.message));
   page.on("requestfailed", (request) => complaints.push(`${request.url()} failed`));
   page.on("request", (request) => {
-    if (!request.url().startsWith(address) && !/^(data|blob):/.test(request.url())) complaints.push(request.url());
+    if (!request.url().startsWith(address) && !/^(data|blob):/.test(request.url()))
+      complaints.push(request.url());
   });
   await before(page);
   await page.goto(address + query);
@@ -87,23 +103,34 @@ async function drawn(page, work) {
   });
 }
 
-const bytes = async (page) => Buffer.from(await page.evaluate(async () => {
-  const picture = await subsurface.page.picture();
-  let text = "";
-  for (let i = 0; i < picture.length; i += 32768) text += String.fromCharCode(...picture.subarray(i, i + 32768));
-  return btoa(text);
-}), "base64");
+const bytes = async (page) =>
+  Buffer.from(
+    await page.evaluate(async () => {
+      const picture = await subsurface.page.picture();
+      let text = "";
+      for (let i = 0; i < picture.length; i += 32768)
+        text += String.fromCharCode(...picture.subarray(i, i + 32768));
+      return btoa(text);
+    }),
+    "base64",
+  );
 
 const choose = (page, what, value) => drawn(page, () => page.selectOption(what, value));
 
 /// As sRGB bytes, red, green, blue and alpha.
-const decoded = async (page, file) => Buffer.from(await page.evaluate(async (base64) => {
-  const blob = await (await fetch(`data:image/png;base64,${base64}`)).blob();
-  const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none" });
-  const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
-  context.drawImage(bitmap, 0, 0);
-  return [...context.getImageData(0, 0, bitmap.width, bitmap.height).data];
-}, (await readFile(file)).toString("base64")));
+const decoded = async (page, file) =>
+  Buffer.from(
+    await page.evaluate(
+      async (base64) => {
+        const blob = await (await fetch(`data:image/png;base64,${base64}`)).blob();
+        const bitmap = await createImageBitmap(blob, { colorSpaceConversion: "none" });
+        const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
+        context.drawImage(bitmap, 0, 0);
+        return [...context.getImageData(0, 0, bitmap.width, bitmap.height).data];
+      },
+      (await readFile(file)).toString("base64"),
+    ),
+  );
 
 /// Half as large: each pixel the mean of the light of four.
 function halved(picture, size) {
@@ -111,10 +138,14 @@ function halved(picture, size) {
   const srgb = (light) => 255 * (light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055);
   const half = size / 2;
   const at = (x, y, c) => linear(picture[4 * (y * size + x) + c]);
-  return Buffer.from(Array.from({ length: half * half * 4 }, (_, i) => {
-    const [c, x, y] = [i % 4, 2 * ((i >> 2) % half), 2 * Math.floor((i >> 2) / half)];
-    return c === 3 ? 255 : Math.round(srgb((at(x, y, c) + at(x + 1, y, c) + at(x, y + 1, c) + at(x + 1, y + 1, c)) / 4));
-  }));
+  return Buffer.from(
+    Array.from({ length: half * half * 4 }, (_, i) => {
+      const [c, x, y] = [i % 4, 2 * ((i >> 2) % half), 2 * Math.floor((i >> 2) / half)];
+      return c === 3
+        ? 255
+        : Math.round(srgb((at(x, y, c) + at(x + 1, y, c) + at(x, y + 1, c) + at(x + 1, y + 1, c)) / 4));
+    }),
+  );
 }
 
 const pictures = {};
@@ -154,7 +185,8 @@ for (const [title, name] of Object.entries(MODES)) {
     assert.ok(share < 0.003, `${(100 * share).toFixed(2)} % of the pixels are off by more than .01`);
     // Half a step of a byte.
     assert.ok(sum / count < 0.5 / 255, `off by ${sum / count} on average`);
-    return `${(100 * share).toFixed(3)} % of the pixels are off by more than .01; ${(sum / count).toFixed(5)} on average`;
+    const [percent, mean] = [(100 * share).toFixed(3), (sum / count).toFixed(5)];
+    return `${percent} % of the pixels are off by more than .01; ${mean} on average`;
   });
 }
 
@@ -189,7 +221,10 @@ await test("views show something else", async () => {
     if (show === "the picture") continue;
     await choose(page, "#show", show);
     const picture = await bytes(page);
-    assert.ok(seen.every((other) => !other.equals(picture)), show);
+    assert.ok(
+      seen.every((other) => !other.equals(picture)),
+      show,
+    );
     seen.push(picture);
   }
   await choose(page, "#show", "the picture");
@@ -231,19 +266,26 @@ await test("mouse, wheel and fingers move the view and the light; reset brings i
   assert.ok((await bytes(page)).equals(before));
 });
 
-const drop = (name, content) => page.evaluate(async ([name, base64]) => {
-  const blob = await (await fetch(`data:;base64,${base64}`)).blob();
-  const dataTransfer = new DataTransfer();
-  dataTransfer.items.add(new File([blob], name));
-  document.body.dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
-}, [name, Buffer.from(content).toString("base64")]);
+const drop = (name, content) =>
+  page.evaluate(
+    async ([name, base64]) => {
+      const blob = await (await fetch(`data:;base64,${base64}`)).blob();
+      const dataTransfer = new DataTransfer();
+      dataTransfer.items.add(new File([blob], name));
+      document.body.dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
+    },
+    [name, Buffer.from(content).toString("base64")],
+  );
 
 const message = () => page.locator("#message").textContent();
 
-const slide = (slider, value) => drawn(page, () => page.locator(slider).evaluate((input, value) => {
-  input.value = value;
-  for (const event of ["input", "change"]) input.dispatchEvent(new Event(event));
-}, value));
+const slide = (slider, value) =>
+  drawn(page, () =>
+    page.locator(slider).evaluate((input, value) => {
+      input.value = value;
+      for (const event of ["input", "change"]) input.dispatchEvent(new Event(event));
+    }, value),
+  );
 
 await test("a plan is fitted for another error, and for another width", async () => {
   const before = await bytes(page);
@@ -271,13 +313,18 @@ await test("a dropped head is drawn; a broken one is refused and changes nothing
 
 await test("a dropped profile scatters; one that cannot is refused", async () => {
   const before = await bytes(page);
-  const profile = (...variances) => JSON.stringify({
-    gaussians: variances.map((variance_mm2) => ({ variance_mm2, weight: [1, 1, 1] })),
-  });
+  const profile = (...variances) =>
+    JSON.stringify({
+      gaussians: variances.map((variance_mm2) => ({ variance_mm2, weight: [1, 1, 1] })),
+    });
   await drawn(page, () => drop("grey.json", profile(0.02, 0.1, 0.5, 2)));
   const grey = await bytes(page);
   assert.ok(!grey.equals(before));
-  for (const [text, why] of [[profile(-1), /variance/], [profile(9), /max_error/], ["{}", /gaussians/]]) {
+  for (const [text, why] of [
+    [profile(-1), /variance/],
+    [profile(9), /max_error/],
+    ["{}", /gaussians/],
+  ]) {
     await drop("no.json", text);
     await page.waitForFunction(() => document.getElementById("message").classList.contains("error"));
     assert.match(await message(), why);
@@ -306,14 +353,19 @@ await test("the chart has a row for every method", async () => {
   }
   for (const { method, ms } of chart.rows) assert.ok(method === "none" || ms > 0, `${method}: ${ms} ms`);
   assert.equal(await page.locator("#plot circle").count(), 14);
-  const list = chart.rows.map((r) => `${r.method} ${r.setting} ${r.ms.toFixed(1)} ms ${(100 * r.rel_rmse).toFixed(3)} %`);
+  const list = chart.rows.map(
+    (r) => `${r.method} ${r.setting} ${r.ms.toFixed(1)} ms ${(100 * r.rel_rmse).toFixed(3)} %`,
+  );
   return `${Object.values(chart.adapter).join(" ")}, ${chart.rows[1].clock}\n  ${list.join("\n  ")}`;
 });
 
 await test("this view is measured", async () => {
   await page.click("#measure");
   await page.waitForFunction(() => document.querySelectorAll("#measured tr").length === 5);
-  return page.locator("#measured").innerText().then((text) => text.replaceAll(/\s+/g, " "));
+  return page
+    .locator("#measured")
+    .innerText()
+    .then((text) => text.replaceAll(/\s+/g, " "));
 });
 
 await page.context().close();
