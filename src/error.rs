@@ -152,17 +152,22 @@ impl fmt::Display for Error {
             }
             Self::Viewport { got, size } => write!(
                 f,
-                "viewport: got {}x{} at {}, {}, needs a rectangle within {}x{}",
+                "viewport: got {}x{} at {}, {}, needs a rectangle of 1x1 or more within {}x{}",
                 got.width, got.height, got.x, got.y, size[0], size[1]
             ),
             Self::Projection { got, needs } => {
                 write!(f, "projection: got {got:?}, needs {needs}")
             }
-            Self::Number { input, got, needs } => {
-                write!(f, "{input}: got {got}, needs {needs}")
+            // Most came as single floats; in double precision -0.1 would read -0.10000000149011612.
+            Self::Number { input, got, needs } => match *got as f32 {
+                single if f64::from(single) == *got => write!(f, "{input}: got {single}, needs {needs}"),
+                _ => write!(f, "{input}: got {got}, needs {needs}"),
+            },
+            Self::Count { input, got, needs: [least, most] } if least == most => {
+                write!(f, "{input}: got {got}, needs {least}")
             }
-            Self::Count { input, got, needs } => {
-                write!(f, "{input}: got {got}, needs {} to {}", needs[0], needs[1])
+            Self::Count { input, got, needs: [least, most] } => {
+                write!(f, "{input}: got {got}, needs {least} to {most}")
             }
             Self::MaxError { got, reachable } => write!(
                 f,

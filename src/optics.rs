@@ -27,11 +27,20 @@ impl Optics {
         let mm = DMat4::from_scale(DVec3::splat(frame.mm_per_unit.into()));
         let inverse = (mm * projection.as_dmat4().inverse()).as_mat4();
         let [x, y, w] = [0, 1, 3].map(|i| projection.row(i));
-        if !projection.is_finite() || !inverse.is_finite() || x.y != 0.0 || y.x != 0.0 {
-            return Err(Error::Projection {
-                got: frame.projection,
-                needs: "a finite, invertible projection whose x and y stay apart",
-            });
+        let refuse = |needs| Err(Error::Projection { got: frame.projection, needs });
+        if !projection.is_finite() || !projection.as_dmat4().inverse().is_finite() {
+            return refuse("finite numbers that can be inverted");
+        }
+        if !inverse.is_finite() {
+            let (got, needs) = (frame.mm_per_unit.into(), "a number with which all depths are finite in mm");
+            return Err(Error::Number { input: "mm_per_unit".into(), got, needs });
+        }
+        if x.y != 0.0 || y.x != 0.0 {
+            return refuse("x and y that stay apart");
+        }
+        // Handed over row by row, a perspective has its -1 where the near plane belongs.
+        if projection.w_axis.z == -1.0 && ![0.0, 1.0].contains(&projection.z_axis.w.abs()) {
+            return refuse("columns; these look like rows");
         }
         let distance = |depth: f32| {
             let z = inverse.z_axis.z * depth + inverse.w_axis.z;
@@ -65,7 +74,7 @@ impl Optics {
         let needs = if [z.x, z.y, w.x, w.y].iter().any(|c| *c != 0.0) {
             "depth that does not depend on x and y; Plan::exact takes oblique near planes"
         } else if w.z > 0.0 {
-            "a right-handed view space, in front of the camera along -Z"
+            "columns, of a right-handed view space that looks along -Z"
         } else {
             return Ok(());
         };

@@ -86,9 +86,8 @@ impl Profile {
         let sum = [0, 1, 2].map(|c| gaussians.iter().map(|g| g.weight[c]).sum::<f32>());
         // Below the least normal number the division would overflow.
         let is_sum = |sum: f32| sum.is_finite() && sum >= f32::MIN_POSITIVE;
-        if let Some(sum) = sum.into_iter().find(|s| !is_sum(*s)) {
-            let needs = "a finite sum above 0 in every colour";
-            return refuse("profile: sum of the weights".into(), sum, needs);
+        if let Some((colour, sum)) = ["red", "green", "blue"].into_iter().zip(sum).find(|(_, s)| !is_sum(*s)) {
+            return refuse(format!("profile: sum of the {colour} weights"), sum, "a finite sum above 0");
         }
         let mut profile =
             Self { gaussians: [NONE; Self::MAX_GAUSSIANS], len: gaussians.len(), fit_error: 0.0 };

@@ -66,7 +66,7 @@ impl Options {
                 other => return Err(refused(other.unexpected())),
             };
             let mut text = || parser.value().and_then(|v| v.string()).map_err(refused);
-            let list = |text: String| Some(text.split(',').map(String::from).collect());
+            let list = |text: String| Some(text.split(',').map(|name| name.trim().to_owned()).collect());
             match name.as_str() {
                 "help" => {
                     print!("{HELP}");
@@ -85,7 +85,7 @@ impl Options {
                         .parse()
                         .ok()
                         .filter(|x: &f32| x.is_finite() && *x > 0.0)
-                        .ok_or_else(|| Error::new("--mm-per-unit", text, "a number above 0"))?;
+                        .ok_or_else(|| Error::new("--mm-per-unit", text, "a number above 0 and below 3.4e38"))?;
                 }
                 _ => return Err(refused(Long(name.as_str()).unexpected())),
             }

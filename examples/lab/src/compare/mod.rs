@@ -131,6 +131,7 @@ fn options() -> Result<Option<Options>, Error> {
         exposure: 1.0,
         out: "out/compare".into(),
     };
+    let mut has_distance = false;
     let mut parser = lexopt::Parser::from_env();
     let refused =
         |e: lexopt::Error| Error::new("command line", format!("\"{e}\""), "options as --help lists them");
@@ -147,18 +148,31 @@ fn options() -> Result<Option<Options>, Error> {
             print!("{HELP}");
             return Ok(None);
         }
-        let mut text =
-            || -> Result<String, Error> { parser.value().and_then(|v| v.string()).map_err(refused) };
+        let mut text = || -> Result<String, Error> {
+            let text = parser.value().and_then(|v| v.string()).map_err(refused)?;
+            // A value that was forgotten, before the next option.
+            let is_option = text.starts_with("--");
+            if is_option { Err(Error::new(format!("--{name}"), text, "a value of its own")) } else { Ok(text) }
+        };
         match name.as_str() {
             "model" => options.model = Some(text()?.into()),
-            "out" => options.out = text()?.into(),
+            "out" => {
+                let text = text()?;
+                if text.is_empty() {
+                    return Err(Error::new("--out", "\"\"", "a directory"));
+                }
+                options.out = text.into();
+            }
             "size" => options.size = size(&text()?)?,
             "view" => {
                 options.view_name = text()?;
                 options.view = options.view_name.parse()?;
             }
             "look-at" => options.look_at = Some(point(&text()?)?),
-            "distance" => options.distance_mm = positive("--distance", &text()?)?,
+            "distance" => {
+                options.distance_mm = positive("--distance", &text()?)?;
+                has_distance = true;
+            }
             "turn" => options.turn_degrees = number("--turn", &text()?)?,
             "skin" => options.skin[0] = names(&text()?),
             "not-skin" => options.skin[1] = names(&text()?),
@@ -187,6 +201,12 @@ fn options() -> Result<Option<Options>, Error> {
                 return Err(refused(lexopt::Error::UnexpectedOption(format!("--{name}"))));
             }
         }
+    }
+    if has_distance && options.look_at.is_none() {
+        return Err(Error::new("--distance", options.distance_mm, "--look-at, from where it is measured"));
+    }
+    if let Some(name) = options.skin[0].iter().find(|name| options.skin[1].contains(name)) {
+        return Err(Error::new("--not-skin", name, "names that --skin has not"));
     }
     // What they depend on was perhaps said after them.
     options.profile = options.material.profile(None, options.max_error)?;
@@ -225,12 +245,12 @@ fn names(text: &str) -> Vec<String> {
 fn number(input: &str, text: &str) -> Result<f32, Error> {
     let number: Option<f32> = text.parse().ok();
     let finite = number.filter(|x| x.is_finite());
-    finite.ok_or_else(|| Error::new(input, text, "a number"))
+    finite.ok_or_else(|| Error::new(input, text, "a number within ±3.4e38"))
 }
 
 fn positive(input: &str, text: &str) -> Result<f32, Error> {
     let positive = number(input, text).ok().filter(|x| *x > 0.0);
-    positive.ok_or_else(|| Error::new(input, text, "a number above 0"))
+    positive.ok_or_else(|| Error::new(input, text, "a number above 0 and below 3.4e38"))
 }
 
 /// A number, or a fraction such as 1/255.
@@ -282,6 +302,12 @@ fn compare(options: &Options) -> Result<(), Error> {
         Some(path) => (path.display().to_string(), Scene::load(path)?),
         None => ("built-in head".to_owned(), Scene::from_glb(crate::HEAD)?),
     };
+    let (low, high) = scene.bounds();
+    let size_mm = (high - low).max_element() * options.mm_per_unit;
+    if !(size_mm > 0.0 && size_mm < 1e9) {
+        let needs = "one above 0 and below 1e9 mm; --mm-per-unit says how long its unit is";
+        return Err(Error::new(model, format!("a size of {size_mm} mm"), needs));
+    }
     scene.choose(&options.skin[0], true, "--skin")?;
     scene.choose(&options.skin[1], false, "--not-skin")?;
     if let Some(albedo) = options.material.albedo {
@@ -333,6 +359,15 @@ fn compare(options: &Options) -> Result<(), Error> {
         options.profile.gaussians().len(),
         options.profile.fit_error()
     ));
+    if !frame.skin.contains(&true) {
+        notes.push("No skin is in view: --skin names it, --look-at and --turn look elsewhere.".into());
+    }
+    // A face of a doll, or of a statue; nobody's.
+    if !(30.0..=3000.0).contains(&size_mm) {
+        notes.push(format!(
+            "The model is {size_mm:.0} mm long: --mm-per-unit says how many millimetres its unit has."
+        ));
+    }
     notes.extend(scene.notes());
     let report = Report {
         adapter: gpu.adapter.clone(),

@@ -101,14 +101,18 @@ impl Camera {
         let p = camera.projection();
         let [x, y, z, w] = [0, 1, 2, 3].map(|i| p.row(i));
         let is_apart = [x.y, y.x, z.x, z.y, w.x, w.y].iter().all(|c| *c == 0.0);
-        let looks_down = w.z < 0.0 || (w.z == 0.0 && w.w > 0.0);
-        let is_finite = p.is_finite() && p.as_dmat4().inverse().is_finite();
-        if !(is_finite && is_apart && looks_down) {
-            let needs = "a finite matrix, column by column, that can be inverted and looks down \
-                         -Z, and whose x, y and depth stay apart";
-            return Err(camera.error(Error::new("projection", p, needs)));
-        }
-        Ok(camera)
+        let needs = if !p.is_finite() || !p.as_dmat4().inverse().is_finite() {
+            "finite numbers that can be inverted"
+        } else if z.w == -1.0 && ![0.0, 1.0].contains(&w.z.abs()) {
+            "columns; these look like rows"
+        } else if !is_apart {
+            "x, y and depth that stay apart"
+        } else if w.z > 0.0 || (w.z == 0.0 && w.w <= 0.0) {
+            "a camera that looks along -Z"
+        } else {
+            return Ok(camera);
+        };
+        Err(camera.error(Error::new("projection", p, needs)))
     }
 
     pub fn size(&self) -> [u32; 2] {

@@ -38,8 +38,7 @@ pub fn main() -> ExitCode {
     {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Names of files and keys may hold line breaks.
-            eprintln!("error: {}", error.to_string().replace(['\n', '\r'], " "));
+            eprintln!("error: {error}");
             ExitCode::FAILURE
         }
     }
@@ -60,6 +59,10 @@ fn filter(options: &Options) -> Result<(), Error> {
             "depth is in half floats, whose steps are up to a thousandth of the distance and show in \
              the result; write full floats",
         );
+    }
+
+    if dump.profile_id.iter().all(|id| *id == 0) {
+        note("nothing scatters: depth is empty everywhere, or profile_id 0");
     }
 
     let plan = match options.max_error {

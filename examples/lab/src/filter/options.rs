@@ -62,7 +62,7 @@ impl Options {
                     variance_scale = positive("--variance-scale", &value(&mut parser)?)?;
                 }
                 Long("max-error") => {
-                    max_error = Some(positive("--max-error", &value(&mut parser)?)?);
+                    max_error = Some(crate::compare::max_error(&value(&mut parser)?)?);
                 }
                 Long("exact") => exact = true,
                 Long("png") => png = true,
@@ -111,7 +111,7 @@ fn positive(input: &str, text: &str) -> Result<f32, Error> {
     text.parse()
         .ok()
         .filter(|x: &f32| x.is_finite() && *x > 0.0)
-        .ok_or_else(|| Error::new(input, text, "a number above 0"))
+        .ok_or_else(|| Error::new(input, text, "a number above 0 and below 3.4e38"))
 }
 
 fn profile(name: &str) -> Result<Profile, Error> {

@@ -27,10 +27,12 @@ impl Buffers {
     ) -> Result<Vec<[T; N]>, Problem> {
         let (shape, kind) = (accessor.dimensions(), accessor.data_type());
         if shape.multiplicity() != N || matches!(shape, Dimensions::Mat2 | Dimensions::Mat3) {
-            return Err((format!("{shape:?} {kind:?}"), "a type glTF allows"));
+            let needs = ["scalars", "", "VEC2", "VEC3", "VEC4"].get(N).copied();
+            let got = format!("{shape:?} of {kind:?}").to_uppercase().replace(" OF ", " of ");
+            return Err((got, needs.filter(|n| !n.is_empty()).unwrap_or("MAT4")));
         }
         if accessor.count() < count {
-            return Err((format!("{} elements", accessor.count()), "as many as are used"));
+            return Err((format!("{} elements", accessor.count()), "one for each that is used"));
         }
         let most = match kind {
             _ if !accessor.normalized() => 1.0,
@@ -83,13 +85,21 @@ impl Buffers {
         count: usize,
         size: usize,
     ) -> Result<impl Iterator<Item = &'a [u8]> + use<'a>, Problem> {
-        let bytes = self.view(view).unwrap_or_default();
+        let whole = self.0.get(view.buffer().index()).map_or(0, Vec::len);
+        let Some(bytes) = self.view(view) else {
+            let (from, to) = (view.offset(), view.offset().saturating_add(view.length()));
+            let got = format!("a buffer view of bytes {from} to {to} of a buffer of {whole}");
+            return Err((got, "a view inside its buffer"));
+        };
         let stride = view.stride().unwrap_or(size);
+        if stride < size {
+            return Err((format!("a byteStride of {stride}"), "no less than an element's size"));
+        }
         let last = count.saturating_sub(1).checked_mul(stride);
         let end = last.and_then(|last| last.checked_add(size)?.checked_add(offset));
-        if stride < size || count > 0 && end.is_none_or(|end| end > bytes.len()) {
-            let got = format!("{count} elements of {size} bytes in {} bytes", bytes.len());
-            return Err((got, "all their bytes"));
+        if count > 0 && end.is_none_or(|end| end > bytes.len()) {
+            let got = format!("{count} elements of {size} bytes in a view of {}", bytes.len());
+            return Err((got, "a view that holds them"));
         }
         Ok((0..count).map(move |i| &bytes[offset + stride * i..][..size]))
     }

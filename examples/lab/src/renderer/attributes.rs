@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
 use gltf::Semantic;
-use gltf::accessor::{Accessor, Dimensions};
+use gltf::accessor::{Accessor, DataType, Dimensions};
 
 use super::accessor::Problem;
 use super::materials::Mapping;
@@ -39,7 +39,11 @@ impl Reader<'_> {
         label: &str,
     ) -> Result<Vec<[f32; N]>, Problem> {
         if accessor.count() != count {
-            return Err((format!("{} of {label}", accessor.count()), "as many as positions"));
+            let got = format!("{} elements of {label} for {count} of POSITION", accessor.count());
+            return Err((got, "as many of both"));
+        }
+        if accessor.data_type() == DataType::U32 {
+            return Err((format!("U32 for {label}"), "floats, or whole numbers of 8 or 16 bits"));
         }
         let numbers = self.buffers.read(accessor, count, |x| x as f32);
         numbers.map_err(|(got, needs)| (format!("{label} of {got}"), needs))
@@ -52,12 +56,6 @@ impl Reader<'_> {
         from: &gltf::Primitive,
         mapping: &Mapping,
     ) -> Result<Attributes, Problem> {
-        let bytes = from.get(&Semantic::Positions).and_then(|accessor| accessor.view());
-        if bytes.is_none() {
-            let draco = from.extension_value("KHR_draco_mesh_compression").is_some();
-            let got = if draco { "KHR_draco_mesh_compression" } else { "POSITION without bytes" };
-            return Err((got.into(), "plain positions"));
-        }
         let is_vec3 = |a: Accessor| a.dimensions() == Dimensions::Vec3;
         let colors = match from.get(&Semantic::Colors(0)).is_some_and(is_vec3) {
             true => {

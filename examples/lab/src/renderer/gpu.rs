@@ -33,6 +33,11 @@ impl Gpu {
     /// # Errors
     /// As [`headless`](Self::headless).
     pub fn with(features: wgpu::Features) -> Result<Self, Error> {
+        if let Ok(name) = std::env::var("WGPU_BACKEND")
+            && wgpu::Backends::from_env().is_none_or(|backends| backends.is_empty())
+        {
+            return Err(Error::new("WGPU_BACKEND", name, "vulkan, metal or dx12"));
+        }
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle_from_env());
         pollster::block_on(Self::of(&instance, features))
     }
@@ -49,8 +54,8 @@ impl Gpu {
                 "a Vulkan, Metal or DirectX 12 driver; on Linux ./setup installs one",
             )
         };
-        let adapter = match wgpu::util::initialize_adapter_from_env(instance, None).await {
-            Ok(adapter) => adapter,
+        let adapter = match std::env::var("WGPU_ADAPTER_NAME") {
+            Ok(name) => named(instance, &name).await?,
             Err(_) => instance
                 .request_adapter(&wgpu::RequestAdapterOptions {
                     power_preference: wgpu::PowerPreference::HighPerformance,
@@ -90,7 +95,7 @@ impl Gpu {
             return Err(Error::new(
                 "size",
                 format!("{}x{}", size[0], size[1]),
-                format!("1 to {limit} pixels each way, {} in all", limits.max_buffer_size / 16),
+                format!("1 to {limit} pixels each way, at most {} together", limits.max_buffer_size / 16),
             ));
         }
         Ok(())
@@ -229,6 +234,18 @@ impl Readback {
         let [row, padded] = self.row.map(|bytes| bytes as usize);
         mapped.chunks_exact(padded).flat_map(|r| &r[..row]).copied().collect()
     }
+}
+
+/// The first adapter whose name holds this, in whatever case. wgpu's own function panics if there is none.
+async fn named(instance: &wgpu::Instance, part: &str) -> Result<wgpu::Adapter, Error> {
+    let adapters = instance.enumerate_adapters(wgpu::Backends::all()).await;
+    let names: Vec<String> = adapters.iter().map(|adapter| adapter.get_info().name).collect();
+    let holds = |name: &String| name.to_lowercase().contains(&part.to_lowercase());
+    let found = names.iter().position(holds).and_then(|i| adapters.into_iter().nth(i));
+    found.ok_or_else(|| {
+        let needs = format!("a part of an adapter's name: {}", names.join(", "));
+        Error::new("WGPU_ADAPTER_NAME", part, needs)
+    })
 }
 
 fn descriptor<'a>(

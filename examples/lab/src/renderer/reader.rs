@@ -48,15 +48,21 @@ pub(super) fn read(bytes: &[u8], base: Option<&Path>, input: &str) -> Result<Sce
     let mut buffers = Vec::new();
     for buffer in document.buffers() {
         let bytes = match buffer.source() {
-            gltf::buffer::Source::Bin => blob.take().ok_or("no binary chunk".to_string()),
+            gltf::buffer::Source::Bin => blob.take().ok_or("no uri, and no binary chunk".to_string()),
             gltf::buffer::Source::Uri(uri) => read_uri(uri, base),
         };
-        buffers.push(bytes.map_err(fail("every buffer's bytes"))?);
+        let (name, length) = (format!("{input}, buffer {}", buffer.index()), buffer.length());
+        let bytes = bytes.map_err(|got| Error::new(&name, got, "its bytes"))?;
+        if bytes.len() < length {
+            let got = format!("{} bytes", bytes.len());
+            return Err(Error::new(name, got, format!("the {length} of its byteLength")));
+        }
+        buffers.push(bytes);
     }
     let tree = Tree::new(document).map_err(fail("nodes that form a tree"))?;
     let nodes: Vec<_> = document.nodes().collect();
     let drawn: Vec<_> = tree.drawn.iter().map(|&i| &nodes[i]).collect();
-    check_size(&drawn).map_err(fail("less to read"))?;
+    check_size(&drawn).map_err(|(got, needs)| Error::new(input, got, needs))?;
     let mut reader = Reader {
         input,
         base,
@@ -73,7 +79,9 @@ pub(super) fn read(bytes: &[u8], base: Option<&Path>, input: &str) -> Result<Sce
     }
     let mut scene = reader.scene;
     if scene.primitives.is_empty() {
-        return Err(fail("triangles in its scene")("no triangles".into()));
+        let left_out = scene.left_out.iter().cloned().collect::<Vec<_>>().join("; ");
+        let why = if left_out.is_empty() { String::new() } else { format!(" (left out: {left_out})") };
+        return Err(fail("opaque triangles in its scene")(format!("nothing to draw{why}")));
     }
     // What no name speaks of is skin where no name speaks of skin.
     let is_named = scene.materials.iter().any(|m| m.profile_id != 0);
@@ -91,9 +99,20 @@ pub(super) fn read(bytes: &[u8], base: Option<&Path>, input: &str) -> Result<Sce
 /// Parses and validates, guarding the two places where the gltf crate panics on bad input.
 fn parse(bytes: &[u8]) -> Result<gltf::Gltf, Problem> {
     let fail = |got: String| (got, "a glTF 2.0 file");
-    // It subtracts the header's size, 12, from the length without a check,
-    if bytes.starts_with(b"glTF") && matches!(bytes.get(8..12), Some([0..12, 0, 0, 0])) {
-        return Err(fail("a length shorter than its header".into()));
+    // Some editors put one before the text.
+    let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes);
+    let is_text = bytes.iter().find(|byte| !byte.is_ascii_whitespace()) == Some(&b'{');
+    if let Some(header) = bytes.strip_prefix(b"glTF").and_then(|rest| rest.first_chunk::<8>()) {
+        let [version, length] = [0, 4].map(|i| u32::from_le_bytes([0, 1, 2, 3].map(|k| header[i + k])));
+        if version != 2 {
+            return Err(fail(format!("version {version}")));
+        }
+        // It subtracts the header's size, 12, from the length without a check,
+        if (length as usize) < 12 || length as usize > bytes.len() {
+            return Err((format!("{} bytes", bytes.len()), "as many as its header states"));
+        }
+    } else if !is_text {
+        return Err(fail("no glTF".into()));
     }
     let gltf = gltf::Gltf::from_slice_without_validation(bytes).map_err(|e| fail(e.to_string()))?;
     let known = |name: &str| READ.contains(&name) || HARMLESS.iter().any(|h| name.starts_with(h));
@@ -186,7 +205,7 @@ impl Tree {
 }
 
 /// Checks how much there is to read, before any of it is.
-fn check_size(nodes: &[&gltf::Node]) -> Result<(), String> {
+fn check_size(nodes: &[&gltf::Node]) -> Result<(), (String, String)> {
     let (mut triangles, mut vertices) = (0usize, 0usize);
     let meshes = nodes.iter().filter_map(|node| node.mesh());
     for primitive in meshes.flat_map(|mesh| mesh.primitives().collect::<Vec<_>>()) {
@@ -201,10 +220,10 @@ fn check_size(nodes: &[&gltf::Node]) -> Result<(), String> {
         vertices = vertices.saturating_add(count.max(corners));
     }
     if triangles > MAX_TRIANGLES {
-        return Err(format!("{triangles} triangles, more than {MAX_TRIANGLES}"));
+        return Err((format!("{triangles} triangles"), format!("at most {MAX_TRIANGLES}")));
     }
     if vertices > MAX_VERTICES {
-        return Err(format!("{vertices} vertices to read, more than {MAX_VERTICES}"));
+        return Err((format!("{vertices} vertices to read"), format!("at most {MAX_VERTICES}")));
     }
     Ok(())
 }
@@ -263,7 +282,17 @@ impl Reader<'_> {
         };
         let alone = mesh.primitives().len() == 1;
         let name = if alone { mesh_name.clone() } else { format!("{mesh_name}/{}", from.index()) };
-        let fail = |(got, needs): Problem| Error::new(&name, got, needs);
+        let input = format!("{}, mesh {}", self.input, name.strip_prefix("mesh ").unwrap_or(&name));
+        let fail = |(got, needs): Problem| Error::new(&input, got, needs);
+        let has_no_bytes = |a: &gltf::Accessor| a.view().is_none() && a.sparse().is_none();
+        if from.get(&Semantic::Positions).is_some_and(|a| has_no_bytes(&a)) {
+            let draco = from.extension_value("KHR_draco_mesh_compression").is_some();
+            let got = if draco { "KHR_draco_mesh_compression" } else { "POSITION without bytes" };
+            return Err(fail((got.into(), "plain positions")));
+        }
+        if from.indices().is_some_and(|a| has_no_bytes(&a)) {
+            return Err(fail(("indices without bytes".into(), "a buffer view of them")));
+        }
         let count = from.get(&Semantic::Positions).map_or(0, |a| a.count());
         let triangles = self.triangles(from, count).map_err(fail)?;
         if triangles.is_empty() {
@@ -274,6 +303,9 @@ impl Reader<'_> {
             self.scene.left_out.insert(format!("{name}, which lets light through"));
             return Ok(());
         }
+        if node.skin().is_some() && from.get(&Semantic::Weights(0)).is_none() {
+            self.scene.left_out.insert(format!("{name}'s rig, which has no weights"));
+        }
         let (material, mapping) = self.material(&from.material(), [&mesh_name, node_name], alone)?;
         let attributes = self.attributes(node, mesh, from, &mapping).map_err(fail)?;
         // Placed, they would be made up anew, as those are that a transform flattens.
@@ -282,9 +314,10 @@ impl Reader<'_> {
         }
         let world = self.tree.worlds[node.index()];
         let (mut vertices, mut indices, head) = attributes.place(&triangles, world);
-        let mut numbers = bytemuck::cast_slice::<Vertex, f32>(&vertices).iter();
-        if !numbers.all(|x| x.is_finite()) {
-            return Err(fail(("NaN or infinity".into(), "finite attributes")));
+        let is_finite = |v: &Vertex| bytemuck::bytes_of(v).as_chunks().0.iter().all(|x| f32::from_ne_bytes(*x).is_finite());
+        if let Some(i) = vertices.iter().position(|v| !is_finite(v)) {
+            let got = format!("NaN or infinity at vertex {i}, as its node places it");
+            return Err(fail((got, "finite attributes and transforms")));
         }
         if vertices.iter().any(|v| v.normal == [0.0; 3]) {
             complete_normals(&mut vertices, &indices);
