@@ -22,8 +22,9 @@ pub struct Frame<'a> {
     /// float or normalised channels. Without albedo, which multiplies the result; a host whose albedo
     /// shows no scattering of its own may hand in E × albedo. Alpha is kept.
     pub irradiance: &'a TextureView,
-    /// Depth as `projection` wrote it: a depth format of 24 bits or more, or R32Float. Of a format that
-    /// has stencil, too, the view must be depth-only. There is no surface at the far plane.
+    /// Depth as `projection` wrote it: any depth format, or R32Float; 16 bits need a near plane that is not too
+    /// near (docs/integration.md). Of a format that has stencil, too, the view must be depth-only. There is no
+    /// surface at the far plane.
     pub depth: &'a TextureView,
     /// View space to clip space, column by column (`to_cols_array_2d` in glam): right-handed, y up, depth
     /// from 0 to 1, as wgpu has it. Perspective or orthographic; forward, reversed or infinite depth;
@@ -41,7 +42,8 @@ pub struct Frame<'a> {
     /// others all the same. Where it is 0 the pixel stays bit for bit. Default, `None`: 1.
     pub strength: Option<&'a TextureView>,
     /// Albedo, linear RGB, that multiplies what is added by [`Output::AddScattered`] and
-    /// [`Output::AddDifference`], so that paint stays sharp. The irradiance is then without albedo.
+    /// [`Output::AddDifference`], so that paint stays sharp: three or four float or normalised channels, such as
+    /// Rgba8UnormSrgb. The irradiance is then without albedo.
     /// [`Output::Scattered`] refuses it, since its result is multiplied by albedo after the effect. Default,
     /// `None`: 1, for an irradiance that has the albedo in it.
     pub albedo: Option<&'a TextureView>,
@@ -97,8 +99,9 @@ pub enum Output {
     /// The scattered light, and the light as it was where nothing scatters: for a texture of its own,
     /// which a final pass multiplies by albedo. Three or four float channels.
     Scattered(TextureFormat),
-    /// The same, times [`Frame::albedo`], added to the target: for one that lacks the diffuse light.
-    /// Rgba16Float, or Rgba32Float on devices that blend it.
+    /// The same, times [`Frame::albedo`], added to the target on every pixel of the viewport: for one that
+    /// lacks all diffuse light, that of cloth and sky, too. Alpha stays. Rgba16Float, or Rgba32Float on devices
+    /// that blend it.
     AddScattered(TextureFormat),
     /// What scattering changes, times [`Frame::albedo`], added to the target: for one that has the diffuse
     /// light already, so that a frame without the effect is right, too. What is added may be negative.

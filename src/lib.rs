@@ -21,7 +21,7 @@
 //! # Conventions
 //! Light is linear. Lengths are millimetres; [`Frame::mm_per_unit`] says how many a scene unit has. Matrices
 //! are column by column, view space is right-handed, depth runs from 0 to 1 in any direction. Errors are in
-//! units of white: of the radiance that the host shows as 1. Every input is checked before the device sees
+//! units of white: of the radiance that the host shows as 1. What wgpu tells of an input is checked before the device sees
 //! it, and what does not fit is an [`Error`] that names it.
 //!
 //! Features of the device: none, and no more than WebGPU's default limits. Feature `json` of the crate:

@@ -32,7 +32,8 @@ impl Optics {
             return refuse("finite numbers that can be inverted");
         }
         if !inverse.is_finite() {
-            let (got, needs) = (frame.mm_per_unit.into(), "a number with which all depths are finite in mm");
+            let (got, needs) =
+                (frame.mm_per_unit.into(), "a number with which all depths are finite in mm");
             return Err(Error::Number { input: "mm_per_unit".into(), got, needs });
         }
         if x.y != 0.0 || y.x != 0.0 {

@@ -12,7 +12,7 @@ use crate::{Error, Output, View, pyramid, validate};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Show {
-    /// Pixels per mm of a surface that faces the camera, in bands of an octave: blue up to 0.25, cyan up to 1,
+    /// Pixels per mm of a surface that faces the camera, in bands of two octaves: blue up to 0.25, cyan up to 1,
     /// green up to 4, yellow up to 16, red beyond. A head that fills a frame of 1080p is green; blue all over
     /// says that [`Frame::mm_per_unit`](crate::Frame::mm_per_unit) is too large, red that it is too small.
     PxPerMm,

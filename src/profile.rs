@@ -86,7 +86,9 @@ impl Profile {
         let sum = [0, 1, 2].map(|c| gaussians.iter().map(|g| g.weight[c]).sum::<f32>());
         // Below the least normal number the division would overflow.
         let is_sum = |sum: f32| sum.is_finite() && sum >= f32::MIN_POSITIVE;
-        if let Some((colour, sum)) = ["red", "green", "blue"].into_iter().zip(sum).find(|(_, s)| !is_sum(*s)) {
+        if let Some((colour, sum)) =
+            ["red", "green", "blue"].into_iter().zip(sum).find(|(_, s)| !is_sum(*s))
+        {
             return refuse(format!("profile: sum of the {colour} weights"), sum, "a finite sum above 0");
         }
         let mut profile =

@@ -155,8 +155,9 @@ impl View {
     }
 
     /// Records as [`render`](Self::render), and has the device write the time before and after pass *i* to
-    /// the queries `first_query` + 2*i* and + 2*i* + 1. Needs the feature `TIMESTAMP_QUERY`. Returns the
-    /// labels of the passes, at most [`MAX_PASSES`](Self::MAX_PASSES).
+    /// the queries `first_query` + 2*i* and + 2*i* + 1 of a set of timestamps, which must have
+    /// `first_query` + 2·[`MAX_PASSES`](Self::MAX_PASSES) queries or more: wgpu checks that, not this. Needs
+    /// the feature `TIMESTAMP_QUERY`. Returns the labels of the passes.
     ///
     /// # Errors
     /// As [`render`](Self::render).

@@ -9,7 +9,7 @@ use subsurface::physics::{
     Diffusion, Fit, Incidence, Layer, Medium, Response, Skin, Transport, single_scattering,
 };
 use subsurface::{Error, Plan, Profile};
-use subsurface_lab::synthetic::{View, plane};
+use subsurface_lab::synthetic::{View, largest, plane};
 use subsurface_lab::truth::closed_form::{scattered_step, softened, step};
 use subsurface_lab::truth::{Walk, random_walk};
 
@@ -33,7 +33,7 @@ fn respond(medium: &Medium) -> Response {
 /// Holds an albedo and step edges to a table's.
 fn hold(name: &str, response: &Response, albedo: f64, edges: [f64; 8], most: [f64; 2]) {
     let off = X_MM.into_iter().zip(edges).map(|(x, e)| (response.edge(x) - e).abs());
-    let off = [(response.albedo() - albedo).abs(), off.fold(0.0, f64::max)];
+    let off = [(response.albedo() - albedo).abs(), largest(off)];
     println!("{name}: R off by {:.5}, E by {:.4}", off[0], off[1]);
     assert!(off[0] <= most[0] && off[1] <= most[1], "{name}: {off:?}");
 }
@@ -234,7 +234,7 @@ fn the_solver_agrees_with_walks() {
         let walk = walk(&medium, transport.incidence, 300_000);
         let response = transport.response(&medium).unwrap();
         let off = X_MM.map(|x| (response.edge(x) - walk.edge(x)[0]).abs());
-        let off = [off.into_iter().fold(0.0, f64::max), response.albedo() / walk.albedo()[0] - 1.0];
+        let off = [largest(off), response.albedo() / walk.albedo()[0] - 1.0];
         println!("{name}: E off by {:.4}, R by {:.1} %", off[0], 100.0 * off[1]);
         let [value, error] = walk.albedo();
         let off = (response.albedo() - value).abs();
@@ -518,7 +518,7 @@ fn burley_is_its_own_formula() {
 /// The worst difference of two step edges.
 fn apart(a: &Response, b: &Response) -> f64 {
     let at = |i| 0.01 * 1.05f64.powi(i);
-    (0..200).map(at).map(|x| (a.edge(x) - b.edge(x)).abs()).fold(0.0, f64::max)
+    largest((0..200).map(at).map(|x| (a.edge(x) - b.edge(x)).abs()))
 }
 
 /// The medium without a refracting surface that sends this much light back, straight in.

@@ -67,12 +67,9 @@ fn hard_edges_match_the_visible_sum() {
             let g = view.shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(step(p.dot(across), 0.0))));
             let out = g.scatter(&Profile::SKIN);
             let near_edge = |h: &Hit| h.point.dot(across).abs() < 3.0 / px_per_mm;
-            let mut worst: f64 = 0.0;
             let pixels = g.pixels(near_edge).into_iter().step_by(37);
             let pixels: Vec<usize> = pixels.map(|(i, _)| i).collect();
-            for error in g.errors(&out, &pixels) {
-                worst = worst.max(error.abs().max_element());
-            }
+            let worst = largest(g.errors(&out, &pixels).iter().map(|e| e.abs().max_element()));
             println!("{px_per_mm} px/mm, {angle}°: max error {worst:.5}");
             assert!(worst <= STEP, "{px_per_mm} px/mm, {angle}°: max error {worst}");
         }
@@ -148,7 +145,7 @@ fn a_plane_in_perspective_matches_the_closed_form() {
             let [a, b] = [wave(hit.point, 1.0), wave(hit.point, -1.0)];
             out[*i] - 0.5 - 0.25 * (left[0] * a + left[1] * b)
         });
-        let worst = errors.map(|e| e.abs().max_element()).fold(0.0, f64::max);
+        let worst = largest(errors.map(|e| e.abs().max_element()));
         let px_per_mm = |i: usize| g.pixels_mm2[pixels[i].0].sqrt().recip();
         println!(
             "{:.1} to {:.1} px/mm: max error {worst:.5} over {} pixels",
@@ -247,8 +244,8 @@ fn every_kind_of_depth_gives_the_same() {
         ("forward infinite", depth(-1.0, -n)),
         ("reversed", depth(n / (f - n), f * n / (f - n))),
     ] {
-        let worst =
-            scene(view).iter().zip(&truth).map(|(a, b)| (*a - *b).abs().max_element()).fold(0.0, f64::max);
+        let found = scene(view);
+        let worst = largest(found.iter().zip(&truth).map(|(a, b)| (*a - *b).abs().max_element()));
         println!("{name}: differs by {worst:.6}");
         // Forward depth is coarser: a float's step there is .4 µm at 80 mm.
         assert!(worst <= 5e-4, "{name}: {worst}");
@@ -270,12 +267,9 @@ fn an_off_centre_projection_gives_the_same() {
     let scene = |view: View| view.shoot(sphere(6.0, 80.0, |n| DVec3::splat((20.0 * n.y).sin() + 1.0)));
     // Only where the half's own edge cuts no kernel.
     let (all, part) = (scene(whole).scatter(&Profile::SKIN), scene(half).scatter(&Profile::SKIN));
-    let mut worst: f64 = 0.0;
-    for y in 0..200 {
-        for x in 120..200 {
-            worst = worst.max((all[y * 400 + 200 + x] - part[y * 200 + x]).abs().max_element());
-        }
-    }
+    let pixels = (0..200).flat_map(|y| (120..200).map(move |x| [y, x]));
+    let worst =
+        largest(pixels.map(|[y, x]| (all[y * 400 + 200 + x] - part[y * 200 + x]).abs().max_element()));
     println!("differs by {worst:.6}");
     assert!(worst <= 2e-4, "{worst}");
 }
@@ -315,6 +309,11 @@ fn profiles_do_not_mix() {
         Some(hit)
     });
     let out = g.scatter_all(&[Profile::SKIN, single_gaussian(4.0)], TextureFormat::Rgba32Float);
+    let mut one = g.clone();
+    one.hits.iter_mut().flatten().for_each(|hit| hit.id = 1);
+    let mixed = one.scatter(&Profile::SKIN);
+    let changes = largest(g.pixels(|_| true).iter().map(|(i, h)| (mixed[*i] - h.irradiance).x.abs()));
+    assert!(changes > 0.1, "halves of one profile mix: {changes}");
     for (i, hit) in g.pixels(|_| true) {
         for (found, before) in out[i].iter().zip(hit.irradiance.to_array()) {
             // Sums of equal terms: rounding only.

@@ -107,7 +107,7 @@ fn assert_exact(what: &str, found: &[Vec3], expected: impl IntoIterator<Item = D
 fn assert_within(tolerance: f64, what: &str, found: &[Vec3], expected: impl IntoIterator<Item = DVec3>) {
     let pairs = found.iter().zip(expected);
     let worst = pairs.map(|(f, e)| (f.as_dvec3() - e).abs().max_element());
-    let worst = worst.fold(0.0, f64::max);
+    let worst = largest(worst);
     println!("{what}: max error {worst:.6}");
     assert!(worst <= tolerance, "{what}: {worst}");
 }

@@ -56,7 +56,8 @@ impl Fit {
     }
 
     /// The profile of as few Gaussians as come within an error on every step edge, or within a twentieth of
-    /// the floor where that is higher. Where eight do not, the eight: see [`edge_error`](Self::edge_error).
+    /// the floor where that is higher. Where eight do not, the eight: see [`edge_error`](Self::edge_error). A
+    /// plan's error is to the fitted profile, so that both add up.
     ///
     /// # Errors
     /// An error that is not above 0; a response whose albedo is not above 0.

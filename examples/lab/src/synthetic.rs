@@ -127,6 +127,7 @@ impl View {
 
 /// Per pixel what is seen, the steps in mm on its tangent plane to the next in the row and in the column, and
 /// its area in mm² were it to face the camera.
+#[derive(Clone)]
 pub struct GBuffer {
     pub view: View,
     pub hits: Vec<Option<Hit>>,
@@ -320,6 +321,16 @@ pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     }
     assert!(n > 0, "nothing to take the mean of");
     (sum / f64::from(n)).sqrt()
+}
+
+/// As `max`, which would lose NaN.
+pub fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b <= a { a } else { b }
+}
+
+/// The largest number; NaN where one of them is.
+pub fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
+    numbers.into_iter().reduce(larger).expect("there is something to take the largest of")
 }
 
 /// Rotates the normal (0, 0, 1) by `tilt` about the image axis at `axis`, both in degrees.

@@ -81,11 +81,10 @@ impl Options {
                 "size" => options.size = Some(size(&text()?)?),
                 "mm-per-unit" => {
                     let text = text()?;
-                    options.mm_per_unit = text
-                        .parse()
-                        .ok()
-                        .filter(|x: &f32| x.is_finite() && *x > 0.0)
-                        .ok_or_else(|| Error::new("--mm-per-unit", text, "a number above 0 and below 3.4e38"))?;
+                    options.mm_per_unit =
+                        text.parse().ok().filter(|x: &f32| x.is_finite() && *x > 0.0).ok_or_else(|| {
+                            Error::new("--mm-per-unit", text, "a number above 0 and below 3.4e38")
+                        })?;
                 }
                 _ => return Err(refused(Long(name.as_str()).unexpected())),
             }

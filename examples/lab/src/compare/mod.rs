@@ -152,7 +152,11 @@ fn options() -> Result<Option<Options>, Error> {
             let text = parser.value().and_then(|v| v.string()).map_err(refused)?;
             // A value that was forgotten, before the next option.
             let is_option = text.starts_with("--");
-            if is_option { Err(Error::new(format!("--{name}"), text, "a value of its own")) } else { Ok(text) }
+            if is_option {
+                Err(Error::new(format!("--{name}"), text, "a value of its own"))
+            } else {
+                Ok(text)
+            }
         };
         match name.as_str() {
             "model" => options.model = Some(text()?.into()),

@@ -16,7 +16,7 @@ use crate::filter::dump::write_depth;
 use crate::filter::fixture::{Case, FLOATS, HALVES, RGB, Samples, run};
 use crate::method::{self, Ours};
 use crate::renderer::{Camera, Gpu, Lighting, Renderer, Scene, View};
-use crate::synthetic;
+use crate::synthetic::{self, largest};
 
 const EXACT: &[&str] = &["--exact"];
 
@@ -126,19 +126,19 @@ fn a_dump_scatters_as_the_frame_did() {
             let relative = |(a, b): (&f32, &f32)| (a - b).abs() / b.max(1.0 / 16384.0);
             apart.extend(ours.iter().zip(theirs).map(relative));
         }
-        let worst = apart.iter().copied().fold(0.0, f32::max);
+        let worst = largest(apart.iter().copied().map(f64::from));
         let beyond = apart.iter().filter(|a| **a > APART).count();
         println!("{how:?}: {worst:.1e} apart, {beyond} beyond {APART:e}");
         match how.contains(&"--max-error") {
-            true => assert!(worst <= HALF_STEP),
-            false => assert!(worst < APART_AT_MOST && beyond <= BEYOND),
+            true => assert!(worst <= f64::from(HALF_STEP)),
+            false => assert!(worst < f64::from(APART_AT_MOST) && beyond <= BEYOND),
         }
     }
     // Why the user is told of depth in half floats.
     let ours = head.dump(HALVES).run(EXACT).unwrap();
     let theirs = head.scattered(&exact);
     let pairs = ours.iter().zip(&theirs).flat_map(|(a, b)| a.iter().zip(b));
-    let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    let worst = largest(pairs.map(|(a, b)| f64::from(a - b).abs()));
     println!("depth in half floats: {worst} apart");
     assert!(worst > 0.01, "{worst}");
 }
@@ -181,7 +181,7 @@ fn flat_skin_scatters_as_the_visible_integral() {
             let scattered = case.run(how).unwrap().into_iter();
             let scattered: Vec<_> = scattered.map(|e| Vec3::from(e).as_dvec3()).collect();
             let errors = frame.errors(&scattered, &asked).into_iter();
-            let worst = errors.fold(0.0, |worst: f64, e| worst.max(e.abs().max_element()));
+            let worst = largest(errors.map(|e| e.abs().max_element()));
             println!("{name} {how:?}: {worst:.5}");
             assert!(worst <= bar, "{name} {how:?}: {worst}");
         }
@@ -332,7 +332,7 @@ fn depth_survives_its_rounding() {
     let worst = |projection, from: f32, to: f32| {
         let distances = (0..=10_000).map(|i| from * (to / from).powf(i as f32 / 10_000.0));
         let errors = distances.map(|z| write_depth(projection, z).unwrap().1 / f64::from(z));
-        errors.fold(0.0, f64::max)
+        largest(errors)
     };
     let projections = [perspective_infinite_reverse(0.4, 1.0, 0.01), perspective(0.4, 1.0, 0.1, 100.0)];
     for (from, to) in [(0.1, 1.0), (1.0, 10.0), (10.0, 100.0)] {

@@ -314,7 +314,9 @@ impl Reader<'_> {
         }
         let world = self.tree.worlds[node.index()];
         let (mut vertices, mut indices, head) = attributes.place(&triangles, world);
-        let is_finite = |v: &Vertex| bytemuck::bytes_of(v).as_chunks().0.iter().all(|x| f32::from_ne_bytes(*x).is_finite());
+        let is_finite = |v: &Vertex| {
+            bytemuck::bytes_of(v).as_chunks().0.iter().all(|x| f32::from_ne_bytes(*x).is_finite())
+        };
         if let Some(i) = vertices.iter().position(|v| !is_finite(v)) {
             let got = format!("NaN or infinity at vertex {i}, as its node places it");
             return Err(fail((got, "finite attributes and transforms")));

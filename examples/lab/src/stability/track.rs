@@ -7,8 +7,7 @@ use crate::stability::case::{Figures, Outcome, Shown};
 use crate::stability::inputs::Texels;
 use crate::stability::lab::Lab;
 use crate::stability::scene::Scene;
-use crate::stability::trial::largest;
-use crate::synthetic::{GBuffer, Hit, View};
+use crate::synthetic::{GBuffer, Hit, View, largest};
 
 /// Errors at the same points in each frame of a sequence.
 #[derive(Default)]

@@ -9,7 +9,7 @@ use crate::stability::inputs::Texels;
 use crate::stability::lab::Lab;
 use crate::stability::scene::Scene;
 use crate::stability::unwrapped::Unwrapped;
-use crate::synthetic::{GBuffer, Hit, View};
+use crate::synthetic::{GBuffer, Hit, View, larger, largest};
 
 /// What a method is held to.
 #[derive(Clone, Copy)]
@@ -305,14 +305,4 @@ pub fn worst_of(outcomes: impl IntoIterator<Item = Result<Outcome, Error>>) -> R
         worst.shown = worst.shown.or(outcome.shown);
     }
     Ok(worst)
-}
-
-/// As `max`, which would lose NaN.
-fn larger(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b <= a { a } else { b }
-}
-
-/// The largest number; NaN where one of them is.
-pub fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
-    numbers.into_iter().fold(f64::NEG_INFINITY, larger)
 }

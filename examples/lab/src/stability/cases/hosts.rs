@@ -10,8 +10,8 @@ use crate::renderer::Gpu;
 use crate::stability::case::{Bound, Case, Figures};
 use crate::stability::inputs::{Texels, Uploaded};
 use crate::stability::lab::{Lab, methods, ours};
-use crate::stability::trial::{largest, merge};
-use crate::synthetic::{View, sphere};
+use crate::stability::trial::merge;
+use crate::synthetic::{View, largest, sphere};
 
 pub fn cases(quick: bool) -> Vec<Case> {
     vec![resized(quick), switched(quick), interleaved(), lost(), leaks(quick)]

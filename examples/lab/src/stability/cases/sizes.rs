@@ -8,7 +8,7 @@ use crate::method::{Ours, scatter};
 use crate::renderer::{Camera, Gpu, Lighting, Renderer, Scene, View};
 use crate::stability::case::{Bound, Case, PLAN, known};
 use crate::stability::lab::Lab;
-use crate::stability::trial::largest;
+use crate::synthetic::largest;
 
 /// The most that a plan may differ by from the exact sum, in units of white: at the worst crease of the
 /// head, the line of the lips, coarse pixels hold light from both sides.

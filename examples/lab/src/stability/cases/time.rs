@@ -13,8 +13,8 @@ use crate::stability::inputs::Texels;
 use crate::stability::lab::Lab;
 use crate::stability::scene::{Form, Scene, Surface, direction};
 use crate::stability::track::{FOLLOWED, Followed, Track, errors, grid, read, taps};
-use crate::stability::trial::{Crop, largest, merge};
-use crate::synthetic::{Hit, View, plane, tilted_normal};
+use crate::stability::trial::{Crop, merge};
+use crate::synthetic::{Hit, View, largest, plane, tilted_normal};
 use crate::truth::closed_form::{
     legendre, passed_harmonics, passed_wave, scattered_cosine, scattered_spot,
 };
