@@ -136,6 +136,16 @@ impl Profile {
         self.fit_error
     }
 
+    /// The same `width` times as wide, each variance times `width`²: for a child, a giant, or a scene whose unit
+    /// is not known.
+    ///
+    /// # Errors
+    /// A width with which a variance is negative or not finite.
+    pub fn scaled(&self, width: f32) -> Result<Self, Error> {
+        let wider = |g: &Gaussian| Gaussian { variance_mm2: g.variance_mm2 * width * width, ..*g };
+        Self::new(&self.gaussians().iter().map(wider).collect::<Vec<_>>())?.with_fit_error(self.fit_error)
+    }
+
     /// How far, in mm, the effects carry light: 3.5 σ of the widest Gaussian. Skin that is nearer than this
     /// to the border of a frame lacks light from beyond it.
     pub fn reach_mm(&self) -> f32 {
@@ -204,6 +214,14 @@ mod tests {
         let shader = crate::exact::gaussian_sum::SHADER;
         let sigmas = crate::wgsl::constant(shader, "REACH_SIGMAS");
         assert_eq!(sigmas, f64::from(REACH_SIGMAS));
+    }
+
+    #[test]
+    fn twice_as_wide_reaches_twice_as_far() {
+        assert_eq!(Profile::SKIN.scaled(1.0), Ok(Profile::SKIN));
+        let twice = Profile::SKIN.scaled(2.0).unwrap();
+        assert!((twice.reach_mm() / Profile::SKIN.reach_mm() - 2.0).abs() < 1e-6);
+        assert!(Profile::SKIN.scaled(f32::INFINITY).is_err());
     }
 
     #[test]

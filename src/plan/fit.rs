@@ -327,11 +327,7 @@ mod tests {
             };
             Profile::new(&terms.iter().map(gaussian).collect::<Vec<_>>()).unwrap()
         };
-        let skin = |width: f32| {
-            let skin = Profile::SKIN;
-            let terms = skin.gaussians().iter().map(|g| (g.variance_mm2 * width * width, g.weight));
-            of(&terms.collect::<Vec<_>>())
-        };
+        let skin = |width: f32| Profile::SKIN.scaled(width).unwrap();
         let eight = (0..8).map(|i| {
             let x = i as f32;
             let green = 0.2 + 0.1 * (1.7 * x).sin().abs();

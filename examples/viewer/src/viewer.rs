@@ -9,7 +9,7 @@ use egui::{
     Sense, Stroke, TextureHandle, Ui, Vec2,
 };
 use image::RgbImage;
-use subsurface::{Gaussian, Profile};
+use subsurface::Profile;
 use subsurface_lab::Error;
 use subsurface_lab::renderer::{Environment, Lighting, Orbit, turn_light};
 
@@ -155,7 +155,7 @@ impl Viewer {
             rect
         });
         let is_moving = ui.input(|i| i.pointer.any_down());
-        let profile = scaled(self.controls.profile_scale)?;
+        let profile = Profile::SKIN.scaled(self.controls.profile_scale)?;
         if !is_moving {
             self.planner.ask(Wish { profile, max_error: self.controls.max_error });
         }
@@ -351,26 +351,5 @@ fn notches(event: &egui::Event) -> f32 {
             MouseWheelUnit::Page => 10.0 * delta.y,
         },
         _ => 0.0,
-    }
-}
-
-/// The profile of skin, `scale` times as wide.
-fn scaled(scale: f32) -> Result<Profile, subsurface::Error> {
-    let gaussians = Profile::SKIN.gaussians().iter();
-    let gaussians: Vec<_> =
-        gaussians.map(|g| Gaussian { variance_mm2: g.variance_mm2 * scale * scale, ..*g }).collect();
-    Profile::new(&gaussians)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::width;
-
-    #[test]
-    fn profiles_are_scaled_in_width() {
-        assert_eq!(scaled(1.0), Ok(Profile::SKIN));
-        let twice = width::widest_mm(&scaled(2.0).unwrap());
-        assert!((twice / width::widest_mm(&Profile::SKIN) - 2.0).abs() < 1e-6);
     }
 }

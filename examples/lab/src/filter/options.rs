@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::Error;
 use crate::filter::read_text;
-use subsurface::{DEFAULT_MAX_ERROR, Gaussian, MAX_PROFILES, Profile};
+use subsurface::{DEFAULT_MAX_ERROR, MAX_PROFILES, Profile};
 
 const HELP: &str = "\
 Scatters a frame that another program dumped; docs/dumps.md says how to write one.
@@ -86,7 +86,8 @@ impl Options {
             profiles.push(Profile::SKIN);
         }
         for profile in &mut profiles {
-            *profile = scaled(profile, variance_scale)?;
+            let scaled = profile.scaled(variance_scale.sqrt());
+            *profile = scaled.map_err(|e| Error::from(e).within("--variance-scale"))?;
         }
         Ok(Some(Self {
             case: case.ok_or_else(|| missing("CASE_DIR"))?,
@@ -120,12 +121,4 @@ fn profile(name: &str) -> Result<Profile, Error> {
     }
     let text = read_text(name.as_ref()).map_err(|e| e.within("--profile"))?;
     Profile::from_json(&text).map_err(|e| Error::from(e).within(name))
-}
-
-fn scaled(profile: &Profile, variance_scale: f32) -> Result<Profile, Error> {
-    let gaussians = profile
-        .gaussians()
-        .iter()
-        .map(|g| Gaussian { variance_mm2: g.variance_mm2 * variance_scale, ..*g });
-    Profile::new(&gaussians.collect::<Vec<_>>()).map_err(|e| Error::from(e).within("--variance-scale"))
 }

@@ -1,7 +1,7 @@
 //! Plans beside the exact sum on a head, over sizes of the frame, views, widths of skin and errors: what one
 //! size hides, another shows. The full atlas runs all of it, tests/sweep.rs the short form.
 
-use subsurface::{Gaussian, Plan, Profile};
+use subsurface::{Plan, Profile};
 
 use crate::Error;
 use crate::method::{Ours, scatter};
@@ -61,10 +61,7 @@ impl Sweep {
     /// No plan for the profile, or a frame that the device cannot hold.
     pub fn worst(&self, gpu: &Gpu) -> Result<f64, Error> {
         let scene = Scene::from_glb(crate::HEAD)?;
-        let wider =
-            |g: &Gaussian| Gaussian { variance_mm2: g.variance_mm2 * self.widening * self.widening, ..*g };
-        let gaussians: Vec<_> = Profile::SKIN.gaussians().iter().map(wider).collect();
-        let profiles = [Profile::new(&gaussians)?];
+        let profiles = [Profile::SKIN.scaled(self.widening)?];
         let exact = Plan::exact(&profiles)?;
         let plans = [100.0, 255.0].map(|e: f32| Plan::new(&profiles, e.recip()));
         let mut worst = Vec::new();
