@@ -109,7 +109,7 @@ fn parse(bytes: &[u8]) -> Result<gltf::Gltf, Problem> {
         }
         // It subtracts the header's size, 12, from the length without a check,
         if (length as usize) < 12 || length as usize > bytes.len() {
-            return Err((format!("{} bytes", bytes.len()), "as many as its header states"));
+            return Err((format!("{} bytes for the {length} of its header", bytes.len()), "a whole file"));
         }
     } else if !is_text {
         return Err(fail("no glTF".into()));
