@@ -9,10 +9,6 @@
 
 use glam::{DVec3, Vec3};
 use image::{Rgb, RgbImage};
-use palette::color_difference::Ciede2000;
-use palette::convert::FromColorUnclamped;
-use palette::white_point::D65;
-use palette::{Lab, LinSrgb};
 
 /// The viewing distance that FLIP assumes, in pixels per degree of visual angle. FLIP's default:
 /// a 0.7 m wide screen of 3840 pixels seen from 0.7 m.
@@ -60,7 +56,13 @@ pub fn erode(mask: &[bool], width: u32, height: u32, pixels: u32) -> Vec<bool> {
 
 /// CIEDE2000 colour difference of two linear RGB colours with sRGB primaries, under D65, with
 /// k_L = k_C = k_H = 1 (\[CIE\]). About 1 is just noticeable.
+#[cfg(feature = "programs")]
 fn delta_e2000(a: DVec3, b: DVec3) -> f64 {
+    use palette::color_difference::Ciede2000;
+    use palette::convert::FromColorUnclamped;
+    use palette::white_point::D65;
+    use palette::{Lab, LinSrgb};
+
     // Light brighter than white is not cut off.
     let lab = |e: DVec3| Lab::<D65, f64>::from_color_unclamped(LinSrgb::new(e.x, e.y, e.z));
     lab(a).difference(lab(b))
@@ -68,6 +70,7 @@ fn delta_e2000(a: DVec3, b: DVec3) -> f64 {
 
 /// The CIEDE2000 difference that `fraction` (0 to 1) of the masked pixels stay within, by nearest
 /// rank: the smallest difference with at least that share at or below it.
+#[cfg(feature = "programs")]
 pub fn delta_e2000_percentile(a: &Layer, reference: &Layer, mask: &[bool], fraction: f64) -> Option<f64> {
     let mut differences: Vec<f64> = masked(a, reference, mask).map(|(a, r)| delta_e2000(a, r)).collect();
     if differences.iter().any(|e| !e.is_finite()) {
