@@ -297,7 +297,7 @@ fn baselines_agree_with_their_closed_values() {
 fn one_layer_is_what_the_baselines_know() {
     let layers = &donner_jensen_2005(0.0).unwrap()[0];
     let error = Diffusion::Dipole.response(layers).unwrap_err();
-    assert_eq!(error.to_string(), "diffusion: layers: got 3, needs 1 to 1");
+    assert_eq!(error.to_string(), "diffusion: layers: got 3, needs 1");
 }
 
 /// All RGB sets whose fits are known, but for those of a spectrum.
