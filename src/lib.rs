@@ -50,6 +50,8 @@ pub use frame::{BackLayer, Frame, Output, Viewport};
 pub use overlay::{Overlay, Show};
 pub use plan::{DEFAULT_MAX_ERROR, Plan};
 pub use profile::{Gaussian, Profile};
+#[doc(hidden)] // of use to the lab alone
+pub use pyramid::Tiles;
 pub use screen_space::{ScreenSpace, View};
 pub use texture_space::{Atlas, TextureSpace};
 pub use wgpu;

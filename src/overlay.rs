@@ -18,8 +18,8 @@ pub enum Show {
     PxPerMm,
     /// The coarsest level of the pyramid that a pixel is blurred at: from dark blue, the frame itself, to red.
     Level,
-    /// How tiles of 8×8 pixels are blurred: green, as planar surfaces; yellow, by the depth of each pixel; red,
-    /// each pixel by its own sum, the dearest.
+    /// How tiles of 8×8 pixels are blurred: green, as planar surfaces; red, each pixel by its own sum, which is
+    /// dearer.
     Class,
     /// Magenta where there is a surface whose id the plan has no profile for; such pixels do not scatter.
     /// Green where a profile is found.

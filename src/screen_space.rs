@@ -8,7 +8,7 @@ use wgpu::{CommandEncoder, Device, QuerySet, Queue, TextureView};
 use crate::exact::{self, Exact, ExactView};
 use crate::gpu::Recorder;
 use crate::optics::Optics;
-use crate::pyramid::{Pyramid, PyramidView, Seen};
+use crate::pyramid::{Pyramid, PyramidView, Seen, Tiles};
 use crate::{Error, Frame, Output, Plan, validate};
 
 /// Scattering as a post-process: a [`Plan`] made ready for a device and an [`Output`].
@@ -169,6 +169,12 @@ impl View {
         first_query: u32,
     ) -> Result<Vec<String>, Error> {
         self.record(encoder, output, Some((queries, first_query)))
+    }
+
+    /// By what the frame that was last rendered was drawn; `None` before the first one by a plan.
+    #[doc(hidden)] // of use to the lab alone, which counts tiles
+    pub fn tiles(&self) -> Option<Tiles<'_>> {
+        self.pyramid.as_ref().map(Pyramid::tiles)
     }
 
     /// What an overlay shows of the frame that was last prepared.

@@ -61,11 +61,10 @@ fn overlays_say_what_is_done() {
     assert!((15_000..40_000).contains(&skin), "{skin}");
     // Every pixel of skin is of some class, and has some level.
     let planar = count(class, |[r, g, _, _]| *r < 40 && *g > 60);
-    let general = count(class, |[r, g, _, _]| *r > 100 && *g > 60);
     let direct = count(class, |[r, g, _, _]| *r > 100 && *g < 40);
-    println!("{planar} planar, {general} general, {direct} direct");
-    assert_eq!(planar + general + direct, skin);
-    assert!(planar > skin / 4 && direct < skin / 8, "{planar} {general} {direct}");
+    println!("{planar} planar, {direct} direct");
+    assert_eq!(planar + direct, skin);
+    assert!(direct < skin / 5, "{planar} {direct}");
     assert_eq!(count(level, |p| p[0] > 0 || p[1] > 0 || p[2] > 0), skin);
 }
 

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use glam::{DVec2, DVec3};
-use subsurface::{Error, Plan, Profile};
+use subsurface::{Error, Gaussian, Plan, Profile};
 use subsurface_lab::synthetic::*;
 use subsurface_lab::truth::closed_form::{scattered_step, step};
 
@@ -138,7 +138,9 @@ fn other_pixels_stay_bit_for_bit() {
 #[test]
 fn no_scattering_leaks_onto_another_profile() {
     // Two halves of one plane, the left of profile 1 and lit; facing, and so steep that taps reach far.
-    let profiles = [Profile::SKIN; 2];
+    let wider =
+        Profile::SKIN.gaussians().iter().map(|g| Gaussian { variance_mm2: 2.0 * g.variance_mm2, ..*g });
+    let profiles = [Profile::SKIN, Profile::new(&wider.collect::<Vec<_>>()).unwrap()];
     for (tilt, max_error) in [(0.0, 0.01), (75.0, 1.0 / 255.0)] {
         let surface =
             plane(tilted_normal(tilt, 0.0), 300.0, |p| DVec3::splat(f64::from(u8::from(p.x < 0.0))));
@@ -154,6 +156,20 @@ fn no_scattering_leaks_onto_another_profile() {
             assert!(error < 0.001, "{tilt}°, pixel {i}: {error}");
         }
     }
+}
+
+#[test]
+fn ids_of_equal_profiles_are_one() {
+    let ball = sphere(9.0, 60.0, |n| DVec3::splat(n.x.max(0.0)));
+    let plan = Plan::new(&[Profile::SKIN; 3], 0.01).unwrap();
+    let by = |ids: fn(DVec3) -> u32| {
+        let g = View::perspective([128, 96], 40.0)
+            .shoot(|origin, ray| ball(origin, ray).map(|hit| Hit { id: ids(hit.point), ..hit }));
+        g.scatter_planned(&plan)
+    };
+    let one = by(|_| 1);
+    assert_eq!(one, by(|_| 3));
+    assert_eq!(one, by(|p| if p.x < 0.5 { 2 } else { 3 }));
 }
 
 #[test]

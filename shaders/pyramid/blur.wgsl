@@ -15,6 +15,8 @@
 @group(0) @binding(9) var coarser_mean: texture_2d<f32>;
 @group(0) @binding(10) var coarser_shape: texture_2d<u32>;
 @group(0) @binding(12) var linear: sampler;
+// Of the host.
+@group(0) @binding(6) var irradiance: texture_2d<f32>;
 // How much a pixel takes of its scattered light.
 @group(0) @binding(4) var strength: texture_2d<f32>;
 // What multiplies what is added to a target.
@@ -42,6 +44,8 @@ fn eigenvalues(m: vec3f) -> vec2f {
 
 // Pixels to a step along the contour of a slope: more would miss what lies between.
 const LONGEST_STEP = 4.0;
+const HALF_LOG2_E = 0.72134752;
+
 // Steps of the taps, in pixels.
 struct Lattice {
     u: vec2i,
@@ -106,7 +110,7 @@ fn sharpness(blur: Blur, variance: vec2f) -> vec2f {
     return select(wide, narrow, c < vec2f(blur.narrow));
 }
 
-// Half the inverse covariance of a blur's weights over i and j: of i², ij and j².
+// What the taps of a blur weigh is 2 to the power of −this: of i², ij and j².
 fn exponents(blur: Blur, plane: Plane, mm2: f32, lattice: Lattice) -> vec3f {
     let u = vec2f(lattice.u);
     let v = vec2f(lattice.v);
@@ -120,86 +124,81 @@ fn exponents(blur: Blur, plane: Plane, mm2: f32, lattice: Lattice) -> vec3f {
     let passed = blur.variance * mm2 / max(det, 1e-30) * vec3f(metric.z, -metric.y, metric.x) - own;
     let sharp = sharpness(blur, passed.xz);
     let c = passed / vec3f(sharp.x, sqrt(sharp.x * sharp.y), sharp.y);
-    return 0.5 / (c.x * c.z - c.y * c.y) * vec3f(c.z, -2.0 * c.y, c.x);
+    return HALF_LOG2_E / (c.x * c.z - c.y * c.y) * vec3f(c.z, -2.0 * c.y, c.x);
 }
 
-// All blurs of the level at a pixel.
-struct Blurs {
-    // Of each, half the inverse covariance over i and j: of i², ij and j².
-    kii: vec4f,
-    kij: vec4f,
-    kjj: vec4f,
-    // Of each, the color of its weight over the mass of its taps.
-    colors: mat4x3f,
-    // The sum of the weights.
+// What the taps of all blurs of the level weigh at a pixel of a plane; those at (i, j) and (−i, −j) weigh the same.
+struct Taps {
+    // Of the blurs that share their taps together, in each color: the one in the middle, then (1, 0), (0, 1),
+    // (1, 1), (1, −1), (2, 0), (0, 2).
+    k00: vec3f,
+    k10: vec3f,
+    k01: vec3f,
+    k11: vec3f,
+    k1m: vec3f,
+    k20: vec3f,
+    k02: vec3f,
+    // Of the square, over the one in the middle, as powers of 2: (1, 0), (0, 1), (1, 1), (1, −1);
+    // (2, 0), (0, 2), (2, 1), (2, −1); (1, 2), (−1, 2), (2, 2), (2, −2).
+    s1: vec4f,
+    s2: vec4f,
+    s3: vec4f,
+    // What its middle weighs in each color.
+    square: vec3f,
+    // The sum of all weights.
     wanted: vec3f,
-    has_square: bool,
+    // The mean of those that share their taps, in square pixels.
+    variance: f32,
 }
 
-fn blurs_at(plane: Plane, scale: Scale, lattice: Lattice) -> Blurs {
-    var blurs = Blurs();
-    for (var j = 0u; j < 4u; j++) {
-        if j < BLURS || (SQUARE && j == 3u) {
-            let k = exponents(level.blurs[j], plane, scale.mm2, lattice);
-            blurs.kii[j] = k.x;
-            blurs.kij[j] = k.y;
-            blurs.kjj[j] = k.z;
-            blurs.colors[j] = weight_at(scale, level.blurs[j].slot);
-            blurs.wanted += blurs.colors[j];
+// Of the taps (1, 0), (0, 1), (1, 1), (1, −1), as powers of 2.
+fn ring(k: vec3f) -> vec4f {
+    return -vec4f(k.x, k.z, k.x + k.y + k.z, k.x - k.y + k.z);
+}
+
+fn taps_of(plane: Plane, scale: Scale, lattice: Lattice) -> Taps {
+    var taps = Taps();
+    var weight = 0.0;
+    for (var j = 0u; j < 3u; j++) {
+        if j < BLURS {
+            let blur = level.blurs[j];
+            let k = exponents(blur, plane, scale.mm2, lattice);
+            let w = exp2(ring(k));
+            var far = vec2f(0.0);
+            if THIRTEEN {
+                far = exp2(-4.0 * k.xz);
+            }
+            let color = weight_at(scale, blur.slot);
+            let middle = color / (1.0 + 2.0 * (dot(w, vec4f(1.0)) + far.x + far.y));
+            taps.k20 += far.x * middle;
+            taps.k02 += far.y * middle;
+            taps.k00 += middle;
+            taps.k10 += w.x * middle;
+            taps.k01 += w.y * middle;
+            taps.k11 += w.z * middle;
+            taps.k1m += w.w * middle;
+            taps.wanted += color;
+            let of_all = color.r + color.g + color.b;
+            weight += of_all;
+            taps.variance += of_all * blur.variance;
         }
     }
-    blurs.has_square = SQUARE && any(blurs.colors[3] > vec3f(0.0));
-    let mass = mass_of_taps(blurs);
-    blurs.colors[0] /= mass.x;
-    blurs.colors[1] /= mass.y;
-    blurs.colors[2] /= mass.z;
-    blurs.colors[3] /= mass.w;
-    return blurs;
-}
-
-// What the taps (i, j) and (−i, −j) weigh in each blur is exp(−this), the one in the middle being 1.
-fn exponents_at(blurs: Blurs, i: i32, j: i32) -> vec4f {
-    let d = vec2f(f32(i), f32(j));
-    return blurs.kii * (d.x * d.x) + blurs.kij * (d.x * d.y) + blurs.kjj * (d.y * d.y);
-}
-
-fn weights_at(blurs: Blurs, i: i32, j: i32) -> vec4f {
-    return weights_of(-exponents_at(blurs, i, j));
-}
-
-// Of those that there are.
-fn weights_of(exponents: vec4f) -> vec4f {
-    var weights = vec4f(exp(exponents.x), 0.0, 0.0, 0.0);
-    if BLURS > 1u {
-        weights.y = exp(exponents.y);
-    }
-    if BLURS > 2u {
-        weights.z = exp(exponents.z);
-    }
+    taps.variance = select(level.blurs[0].variance, taps.variance / weight, weight > NEGLIGIBLE_WEIGHT);
     if SQUARE {
-        weights.w = exp(exponents.w);
+        let color = weight_at(scale, level.blurs[3].slot);
+        if any(color > vec3f(0.0)) {
+            let k = exponents(level.blurs[3], plane, scale.mm2, lattice);
+            taps.s1 = ring(k);
+            let far = vec2f(4.0 * k.x + k.z, k.x + 4.0 * k.z);
+            let skew = vec2f(2.0, -2.0) * k.y;
+            taps.s2 = -vec4f(4.0 * k.x, 4.0 * k.z, far.x + skew);
+            taps.s3 = vec4f(-far.y - skew, 4.0 * taps.s1.zw);
+            let all = exp2(taps.s1) + exp2(taps.s2) + exp2(taps.s3);
+            taps.square = color / (1.0 + 2.0 * dot(all, vec4f(1.0)));
+            taps.wanted += color;
+        }
     }
-    return weights;
-}
-
-// Of the square alone, whose taps the others do not have.
-fn square_weight_at(blurs: Blurs, i: i32, j: i32) -> f32 {
-    return exp(-exponents_at(blurs, i, j).w);
-}
-
-// What all taps of a blur weigh.
-fn mass_of_taps(blurs: Blurs) -> vec4f {
-    var w = weights_at(blurs, 1, 0) + weights_at(blurs, 0, 1) + weights_at(blurs, 1, 1)
-        + weights_at(blurs, 1, -1);
-    if THIRTEEN {
-        w += weights_at(blurs, 2, 0) + weights_at(blurs, 0, 2);
-    }
-    if SQUARE {
-        w.w += square_weight_at(blurs, 2, 1) + square_weight_at(blurs, 2, -1)
-            + square_weight_at(blurs, 1, 2) + square_weight_at(blurs, -1, 2)
-            + square_weight_at(blurs, 2, 2) + square_weight_at(blurs, 2, -2);
-    }
-    return 1.0 + 2.0 * w;
+    return taps;
 }
 
 // The blurs of this level and of all coarser ones at a pixel.
@@ -244,17 +243,20 @@ fn mean_of(g: Gathered) -> vec4f {
     return half_floats(vec4f(in_half_floats(mean), 1.0));
 }
 
-// What fs_frame tells of a pixel that takes so much of its scattered light: all of it, or, to be added, what
-// it differs by from before. Writes no alpha: it is the host's.
+// What fs_frame tells of a pixel that takes so much of its scattered light: all of it, or what it differs by from
+// before; where it takes none, what the host had. Alpha is the host's.
 fn scattered(pixel: vec2i, g: Gathered, e: vec3f, share: f32) -> vec4f {
+    let pixel_of_host = vec2i(view.first_pixel) + pixel;
     let difference = share * (g.light - e * g.weight);
+    var color = vec4f(difference, 0.0);
     if !DIFFERENCE {
-        return vec4f(e + difference, 1.0);
+        let host = textureLoad(irradiance, pixel_of_host, 0);
+        color = vec4f(select(host.rgb, e + difference, share > 0.0), host.a);
     }
-    if view.has_albedo == 0u {
-        return vec4f(difference, 1.0);
+    if view.has_albedo != 0u {
+        color = vec4f(color.rgb * textureLoad(albedo, pixel_of_host, 0).rgb, color.a);
     }
-    return vec4f(difference * textureLoad(albedo, vec2i(view.first_pixel) + pixel, 0).rgb, 1.0);
+    return color;
 }
 
 fn share_at(pixel: vec2i) -> f32 {

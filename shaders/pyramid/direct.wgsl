@@ -11,12 +11,12 @@
 @group(0) @binding(14) var lights: texture_2d<f32>;
 @group(0) @binding(15) var shapes: texture_2d<u32>;
 
-// Two Gaussians that are summed together.
+// Gaussians of a level that are summed as one.
 struct Step {
-    // In square pixels of the level; 0 where there is only one.
-    variances: vec2f,
+    // In square pixels of the level; 0 where there are fewer than three.
+    variances: vec3f,
     level: u32,
-    // Where the first's weights are in a row; the second's follow.
+    // Where the first's weights are in a row; the others' follow.
     slot: u32,
 }
 
@@ -24,7 +24,7 @@ const STEPS = 12u;
 // Furthest taps, in pixels of a level: at 75° a Gaussian is cut off.
 const REACH = 6.0;
 
-// A Gaussian of no more weight is not summed: its part goes to the narrower one beside it, or stays.
+// Gaussians of no more weight together are not summed: their part stays.
 const LEAST_WEIGHT = 0.004;
 
 // Weights are max(1 − r²/8v, 0)², whose variance is v: near to a Gaussian, and 0 beyond √8 σ.
@@ -67,34 +67,40 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
     var g = Gathered();
     for (var i = 0u; i < STEPS; i++) {
         let step = steps[i];
-        if step.level > coarsest || step.variances.x == 0.0 {
+        if step.level > coarsest {
             break;
         }
-        var w0 = weight_at(scale, step.slot);
-        var w1 = vec3f(0.0);
-        if step.variances.y > 0.0 {
-            w1 = weight_at(scale, step.slot + 1u);
+        if step.variances.x == 0.0 {
+            continue;
         }
-        let has_second = any(w1 > vec3f(LEAST_WEIGHT));
-        if !has_second {
-            w0 += w1;
+        var weight = vec3f(0.0);
+        var moment = vec3f(0.0);
+        for (var j = 0u; j < 3u; j++) {
+            if step.variances[j] > 0.0 {
+                let w = weight_at(scale, step.slot + j);
+                weight += w;
+                moment += step.variances[j] * w;
+            }
         }
-        if !has_second && all(w0 <= vec3f(LEAST_WEIGHT)) {
-            g.light += w0 * e;
-            g.weight += w0;
+        g.weight += weight;
+        // As wide as the widest color asks for; of a narrower one part of the light stays, so that its variance
+        // is right, too.
+        let means = moment / max(weight, vec3f(1e-6));
+        let variance = max(max(means.r, means.g), means.b);
+        let passed = select(weight * (means / variance), vec3f(0.0), weight <= vec3f(LEAST_WEIGHT));
+        g.light += (weight - passed) * e;
+        if all(passed <= vec3f(0.0)) {
             continue;
         }
         let side = f32(1u << step.level);
         let own = 0.25 * (1.0 - 1.0 / (side * side));
         let m = plane.m * (side * side);
-        let v = step.variances * (scale.mm2 * side * side);
-        let in_space = 1.0 / (CUT * max(v, vec2f(NARROWEST_IN_SPACE * scale.mm2)));
-        let k0 = on_plane(v.x, in_space.x, m, own);
-        let k1 = on_plane(select(v.x, v.y, has_second), in_space.y, m, own);
-        // The ball of the wider one, as it is seen.
+        let variance_mm2 = variance * scale.mm2 * side * side;
+        let in_space = 1.0 / (CUT * max(variance_mm2, NARROWEST_IN_SPACE * scale.mm2));
+        let k = on_plane(variance_mm2, in_space, m, own);
+        // The ball, as it is seen.
         let mm = facing * side;
-        let reach2 = CUT * max(select(v.x, v.y, has_second) / (mm * mm) - own, vec2f(0.15));
-        let reach = min(sqrt(reach2), vec2f(REACH));
+        let reach = min(sqrt(CUT * max(variance_mm2 / (mm * mm) - own, vec2f(0.15))), vec2f(REACH));
         let center = at / side - 0.5;
         let first = max(vec2i(ceil(center - reach)), vec2i(0));
         let last = min(vec2i(floor(center + reach)), vec2i(textureDimensions(shapes, step.level)) - 1);
@@ -102,17 +108,15 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
         let step_x = view.step.xz * side;
         let first_x = view.origin.xz + 0.5 * step_x - vec2f(0.0, p.x);
         let first_y = view.origin.yw + 0.5 * view.step.yw * side - vec2f(0.0, p.y);
-        var sum0 = vec4f(0.0);
-        var sum1 = vec4f(0.0);
+        var sum = vec4f(0.0);
         for (var y = first.y; y <= last.y; y++) {
             let dy = f32(y) - center.y;
             let half = reach.x * sqrt(saturate(1.0 - dy * dy / (reach.y * reach.y)));
             let to = min(i32(floor(center.x + half)), last.x);
             let row_y = first_y + view.step.yw * (side * f32(y));
-            // 1 − k₀₀ dx² − k₀₁ dx dy − k₁₁ dy² of each of the two.
-            let k00 = vec2f(k0.x, k1.x);
-            let k01 = vec2f(k0.y, k1.y) * dy;
-            let rest = 1.0 - vec2f(k0.z, k1.z) * (dy * dy);
+            // 1 − k₀₀ dx² − k₀₁ dx dy − k₁₁ dy².
+            let k01 = k.y * dy;
+            let rest = 1.0 - k.z * (dy * dy);
             for (var x = max(i32(ceil(center.x - half)), 0); x <= to; x++) {
                 let there = textureLoad(shapes, vec2i(x, y), step.level).rg;
                 let light = textureLoad(lights, vec2i(x, y), step.level);
@@ -120,18 +124,11 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
                 let row_x = first_x + step_x * f32(x);
                 let off = vec3f(row_x.x * z + row_x.y, row_y.x * z + row_y.y, z - p.z);
                 let dx = f32(x) - center.x;
-                let near = saturate(rest - dx * (k00 * dx + k01) - dot(off, off) * in_space);
-                let weight = select(vec2f(0.0), near * near, there.x >> 24u == shape.id);
-                sum0 += weight.x * light;
-                sum1 += weight.y * light;
+                let near = saturate(rest - dx * (k.x * dx + k01) - dot(off, off) * in_space);
+                sum += select(0.0, near * near, there.x >> 24u == shape.id) * light;
             }
         }
-        g.light += w0 * select(e, sum0.rgb / sum0.a, sum0.a > 1e-6);
-        g.weight += w0;
-        if has_second {
-            g.light += w1 * select(e, sum1.rgb / sum1.a, sum1.a > 1e-6);
-            g.weight += w1;
-        }
+        g.light += passed * select(e, sum.rgb / sum.a, sum.a > 1e-6);
     }
     // Levels that a small frame lacks: what the last one holds stands for them.
     let beyond = weight_at(scale, level.rest + view.levels);
@@ -149,7 +146,7 @@ fn fs_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let pixel = vec2i(at.xy) - vec2i(view.first_pixel);
     let shape = unpacked(textureLoad(here_shape, pixel, 0).rg);
     let share = share_at(pixel);
-    if shape.id == 0u || share <= 0.0 {
+    if shape.id == 0u {
         discard;
     }
     let e = light_of(textureLoad(here_light, pixel, 0));

@@ -10,7 +10,7 @@
 @fragment
 fn fs_downsample(@builtin(position) at: vec4f) -> Surface {
     let pixel = vec2i(at.xy);
-    if CLASS == GENERAL {
+    if CLASS == CAREFUL {
         return of_one_surface(pixel);
     }
     return of_all(pixel);

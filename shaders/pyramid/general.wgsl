@@ -1,4 +1,4 @@
-// The blurs of a level where anything may be around: edges, layers, bends. Follows blur.wgsl.
+// The blurs of a level above the frame where anything may be around: edges, layers, bends. Follows blur.wgsl.
 //
 // Weighing is by the plane through the pixel where its neighbours lie on that plane, and by their
 // distance in space where they do not.
@@ -17,100 +17,93 @@ struct Center {
     to_ray_v: vec2f,
     ray2: f32,
     last: vec2i,
-    blurs: Blurs,
-    // Of each blur, 1/2v in mm.
-    half: vec4f,
-    // Of each blur, how many times more its square is with what the pyramid blurs by itself, less 1.
-    untold: vec4f,
+    taps: Taps,
+    // Of the blurs that share their taps and of the square, log₂ e/2v in mm.
+    half: vec2f,
 }
 
 var<private> center: Center;
 // Light by what it weighs, and what it weighs.
 var<private> light: vec3f;
 var<private> mass: vec3f;
+// Of the square beyond 3×3, over what its middle weighs.
+var<private> outer: vec4f;
 
 // A pixel that a blur may reach.
 struct Neighbour {
     e: vec4f,
-    // What the squared distance has more than on the plane.
-    bend: f32,
+    // What its distance off the plane takes of the weight of the blurs that share their taps and of the square, as powers of 2: all
+    // where it is not of the same profile.
+    off: vec2f,
 }
 
-// e.a = 0 where there is nothing of the same profile.
 fn neighbour(i: i32, j: i32) -> Neighbour {
     let q = center.pixel + i * center.lattice.u + j * center.lattice.v;
     let there = textureLoad(here_shape, q, 0).rg;
-    var e = textureLoad(here_light, q, 0);
-    let outside = any(q < vec2i(0)) || any(q > center.last);
-    e = select(e, vec4f(0.0), outside || there.x >> 24u != center.id);
+    let e = textureLoad(here_light, q, 0);
+    // Below 0 is far beyond the last.
+    let is_same = all(vec2u(q) <= vec2u(center.last)) && there.x >> 24u == center.id;
     // Off the plane along the ray.
     let on_ray = f32(i) * center.to_ray_u + f32(j) * center.to_ray_v;
     let off = bitcast<f32>(there.y) - center.plane.z - on_ray.y;
-    return Neighbour(e, off * (2.0 * on_ray.x + off * center.ray2));
+    let bend = off * (2.0 * on_ray.x + off * center.ray2);
+    return Neighbour(e, select(vec2f(-1e9), -bend * center.half, is_same));
 }
 
-fn add(there: Neighbour, weight: vec3f) {
+// No weight grows beyond the middle's.
+fn tap(i: i32, j: i32, k: vec3f, s: f32) {
+    let there = neighbour(i, j);
+    var weight = min(exp2(min(there.off.x, LARGEST)) * k, center.taps.k00);
+    if SQUARE {
+        weight += exp2(min(s + there.off.y, 0.0)) * center.taps.square;
+    }
     light += weight * there.e.rgb;
     mass += weight * there.e.a;
 }
 
-// What is off the plane, as it adds to exponents. What the pyramid blurs by itself knows no distance off
-// the plane, which on a bent surface grows as that on it to the fourth: taps make up for it. At a step
-// in depth there is nothing to make up for.
-fn off_plane(bend: f32) -> vec4f {
-    let x = bend * center.half;
-    if FINEST {
-        return x;
-    }
-    return x * (1.0 + center.untold / (1.0 + 2.0 * abs(x)));
+// Less than a float's largest power of 2.
+const LARGEST = 30.0;
+
+fn pair(i: i32, j: i32, k: vec3f, s: f32) {
+    tap(i, j, k, s);
+    tap(-i, -j, k, s);
 }
 
-fn tap(i: i32, j: i32, exponents: vec4f) {
+fn square_tap(i: i32, j: i32, s: f32) {
     let there = neighbour(i, j);
-    // No weight grows beyond the middle's.
-    let weights = weights_of(min(-exponents - off_plane(there.bend), vec4f(0.0)));
-    add(there, center.blurs.colors * weights);
+    outer += exp2(min(s + there.off.y, 0.0)) * there.e;
 }
 
-fn pair(i: i32, j: i32) {
-    let exponents = exponents_at(center.blurs, i, j);
-    tap(i, j, exponents);
-    tap(-i, -j, exponents);
-}
-
-fn square_tap(i: i32, j: i32, exponent: f32) {
-    let there = neighbour(i, j);
-    let weight = exp(min(-exponent - off_plane(there.bend).w, 0.0));
-    add(there, center.blurs.colors[3] * weight);
-}
-
-fn square_pair(i: i32, j: i32) {
-    let exponent = exponents_at(center.blurs, i, j).w;
-    square_tap(i, j, exponent);
-    square_tap(-i, -j, exponent);
+fn square_pair(i: i32, j: i32, s: f32) {
+    square_tap(i, j, s);
+    square_tap(-i, -j, s);
 }
 
 // Sums the light around the center.
 fn gather() {
-    light = vec3f(0.0);
-    mass = vec3f(0.0);
-    tap(0, 0, vec4f(0.0));
-    pair(1, 0);
-    pair(0, 1);
-    pair(1, 1);
-    pair(1, -1);
+    let taps = center.taps;
+    let here = textureLoad(here_light, center.pixel, 0);
+    light = (taps.k00 + taps.square) * here.rgb;
+    mass = (taps.k00 + taps.square) * here.a;
+    pair(1, 0, taps.k10, taps.s1.x);
+    pair(0, 1, taps.k01, taps.s1.y);
+    pair(1, 1, taps.k11, taps.s1.z);
+    pair(1, -1, taps.k1m, taps.s1.w);
     if THIRTEEN {
-        pair(2, 0);
-        pair(0, 2);
+        pair(2, 0, taps.k20, taps.s2.x);
+        pair(0, 2, taps.k02, taps.s2.y);
     }
     if SQUARE {
-        if center.blurs.has_square {
-            square_pair(2, 1);
-            square_pair(2, -1);
-            square_pair(1, 2);
-            square_pair(-1, 2);
-            square_pair(2, 2);
-            square_pair(2, -2);
+        if any(taps.square > vec3f(0.0)) {
+            outer = vec4f(0.0);
+            square_pair(2, 1, taps.s2.z);
+            square_pair(2, -1, taps.s2.w);
+            square_pair(1, 2, taps.s3.x);
+            square_pair(-1, 2, taps.s3.y);
+            square_pair(2, 2, taps.s3.z);
+            square_pair(2, -2, taps.s3.w);
+            light += taps.square * outer.rgb;
+            mass += taps.square * outer.a;
         }
     }
 }
@@ -161,17 +154,15 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
     center.to_ray_v = along * vec2f(scale.lattice.v);
     center.ray2 = dot(r, r);
     center.last = vec2i(textureDimensions(here_light)) - 1;
-    center.blurs = blurs_at(plane, scale, scale.lattice);
-    for (var j = 0u; j < 4u; j++) {
-        if j < BLURS || (SQUARE && j == 3u) {
-            let blur = level.blurs[j];
-            let told = 1.0 - blur.own / blur.variance;
-            center.untold[j] = 1.0 / (told * told) - 1.0;
-            // Weights of single pixels are wider than what they spread by.
-            center.half[j] = 0.5 / (max(blur.variance, NARROWEST_WEIGHTS) * scale.mm2);
-        }
-    }
-    let wanted = center.blurs.wanted;
+    center.taps = taps_of(plane, scale, scale.lattice);
+    let wanted = center.taps.wanted;
+    // Weights of single pixels are wider than what they spread by.
+    let variances = vec2f(center.taps.variance, level.blurs[3].variance);
+    center.half = HALF_LOG2_E / (max(variances, vec2f(NARROWEST_WEIGHTS)) * scale.mm2);
+    // What the pyramid blurs by itself knows no distance off the plane, which on a bent surface grows as that on it
+    // to the fourth: taps make up for it.
+    let told = 1.0 - level.blurs[0].own / max(variances, vec2f(1e-3));
+    center.half /= told * told;
     var blurred = vec3f(0.0);
     if any(wanted > vec3f(0.0)) {
         gather();
@@ -194,16 +185,4 @@ fn fs_level(@builtin(position) at: vec4f) -> @location(0) vec4f {
     }
     let e = light_of(textureLoad(here_light, pixel, 0));
     return mean_of(gathered(pixel, e, shape));
-}
-
-@fragment
-fn fs_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
-    let pixel = vec2i(at.xy) - vec2i(view.first_pixel);
-    let shape = unpacked(textureLoad(here_shape, pixel, 0).rg);
-    let share = share_at(pixel);
-    if shape.id == 0u || share <= 0.0 {
-        discard;
-    }
-    let e = light_of(textureLoad(here_light, pixel, 0));
-    return scattered(pixel, gathered(pixel, e, shape), e, share);
 }

@@ -1,6 +1,7 @@
 // Where a host's frame has a surface, and how coarsely it is blurred there. Follows surface.wgsl.
 
-// The first vector of a row of weights has the coarsest level in w.
+// The first vector of a row of weights has the coarsest level in w, the second which id stands for the profile:
+// ids of equal profiles are one.
 @group(0) @binding(3) var<storage, read> weights: array<vec4f>;
 @group(0) @binding(5) var depth: texture_2d<f32>;
 @group(0) @binding(6) var profile_id: texture_2d<u32>;

@@ -43,13 +43,10 @@ fn contents_around(grid: vec4u, tile: vec2i) -> Contents {
 }
 
 // What the tiles of the level before hold, of which this tile is made, and those around them: as far as taps
-// reach.
+// reach. Of the frame nothing.
 fn contents_in_reach(l: u32, tile: vec2i) -> Contents {
-    if l == 0u {
-        return contents_around(grids[0], tile);
-    }
     var held = Contents();
-    for (var i = 0; i < 16; i++) {
+    for (var i = 0; i < select(16, 0, l == 0u); i++) {
         let one = contents_of(grids[l - 1u], 2 * tile + vec2i(i & 3, i >> 2u) - 1);
         held.marks |= one.marks;
         held.brightest = max(held.brightest, one.brightest);
@@ -57,12 +54,6 @@ fn contents_in_reach(l: u32, tile: vec2i) -> Contents {
     }
     return held;
 }
-
-// What pixels without skin are taken for.
-const HOLES = 1.0;
-// How many times more is in doubt where depth makes a step, for a tile to be planar: light then may come from
-// another layer.
-const STEPS_OF_DEPTH = 4.0;
 
 // Whether pixels are so far from square that blurs of few taps do not fit them, and not so far that steps of
 // two pixels do.
@@ -79,7 +70,6 @@ fn doubt(held: Contents, l: u32) -> f32 {
     let difficulty = (held.marks >> DIFFICULTY_SHIFT) & 15u;
     // The largest bound that the surface passed: .03, .125, .5 or 2, and twice that on each level.
     var bend = select(0.0, exp2(f32(2u * firstLeadingBit(difficulty) + l) - 5.0), difficulty != 0u);
-    bend = max(bend, select(0.0, HOLES, (held.marks & NOT_SKIN) != 0u));
     bend = max(bend, select(0.0, 2.0, has_odd_pixels()));
     return min(bend, 2.0) * (bitcast<f32>(held.brightest) - bitcast<f32>(~held.darkest));
 }
@@ -87,22 +77,16 @@ fn doubt(held: Contents, l: u32) -> f32 {
 // How a tile with skin is blurred.
 fn class_of(tile: vec2i, l: u32) -> u32 {
     let around = contents_around(grids[l], tile);
+    let mixes = countOneBits(around.marks & PROFILES) > 1u;
+    var doubted = doubt(contents_in_reach(l, tile), l) > view.level_limit;
     if l == 0u {
         var near = contents_of(grids[0], tile);
         if has_odd_pixels() {
             near = around;
         }
-        if doubt(near, 0u) > view.general_limit {
-            return DIRECT;
-        }
+        doubted = doubt(near, 0u) > view.frame_limit;
     }
-    let mixes = countOneBits(around.marks & PROFILES) > 1u;
-    let reached = contents_in_reach(l, tile);
-    let has_step = ((reached.marks >> DIFFICULTY_SHIFT) & 8u) != 0u;
-    if mixes || doubt(reached, l) * select(1.0, STEPS_OF_DEPTH, has_step) > view.planar_limit {
-        return GENERAL;
-    }
-    return PLANAR;
+    return select(PLANAR, CAREFUL, mixes || doubted);
 }
 
 // One thread a tile: lists those with skin that need their level, or are next to one that does.
@@ -125,11 +109,5 @@ fn list_tiles(@builtin(global_invocation_id) at: vec3u) {
     let word = (at.y << 16u) | at.x;
     let kind = class_of(tile, l);
     let place = atomicAdd(&draws[CLASSES * l + kind].instances, 1u);
-    if kind == DIRECT {
-        list[view.first_direct + place] = word;
-    } else if kind == GENERAL {
-        list[grid.z + grid.x * grid.y - 1u - place] = word;
-    } else {
-        list[grid.z + place] = word;
-    }
+    list[grid.z + select(place, grid.x * grid.y - 1u - place, kind == CAREFUL)] = word;
 }

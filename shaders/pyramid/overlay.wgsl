@@ -44,13 +44,7 @@ fn fs_overlay(shown: Shown) -> @location(0) vec4f {
         color = heat(f32(coarsest_level(here.z, here.id)) / 8.0);
     } else if shown.show == CLASS_OF_TILE {
         let kind = class_of(vec2i(pixel) / i32(TILE), 0u);
-        if kind == PLANAR {
-            color = vec3f(0.0, 0.6, 0.0);
-        } else if kind == GENERAL {
-            color = vec3f(0.9, 0.7, 0.0);
-        } else {
-            color = vec3f(0.9, 0.0, 0.0);
-        }
+        color = select(vec3f(0.9, 0.0, 0.0), vec3f(0.0, 0.6, 0.0), kind == PLANAR);
     }
     return vec4f(color, 0.6);
 }

@@ -75,6 +75,21 @@ fn area_weighed(host: vec3f, area: f32) -> vec4f {
     return vec4f(light * area, area) * min(1.0, MOST_LIGHT / max(most, 1.0));
 }
 
+// From how many pixel widths on a second difference of depth is a step, and how far taps reach, in pixels.
+const STEP = 2.0;
+const REACH = 2;
+
+// Adds a step, and the light there, to what a tile of the frame holds.
+fn tell(tile: vec2i, brightness: f32) {
+    let grid = vec2i(grids[0].xy);
+    if all(tile >= vec2i(0)) && all(tile < grid) {
+        let first = 3u * u32(tile.y * grid.x + tile.x);
+        atomicOr(&contents[first], difficulty_bits(2.0 * STEP));
+        atomicMax(&contents[first + 1u], bitcast<u32>(brightness));
+        atomicMax(&contents[first + 2u], ~bitcast<u32>(brightness));
+    }
+}
+
 // Packs a pixel of the viewport, and adds what it holds to what its tile does.
 fn pack(pixel: vec2i) {
     let pixel_of_host = vec2i(view.first_pixel) + pixel;
@@ -83,7 +98,7 @@ fn pack(pixel: vec2i) {
         atomicOr(&marks, NOT_SKIN);
         return;
     }
-    let id = here.id;
+    let id = u32(weights[(here.id - 1u) * view.rows * view.stride + 1u].w);
     let z = here.z;
     let last = vec2i(view.size) - 1;
     let left = z_at(vec2i(max(pixel.x - 1, 0), pixel.y));
@@ -117,6 +132,14 @@ fn pack(pixel: vec2i) {
     }
     textureStore(packed_light, pixel, half_floats(light));
     textureStore(packed_shape, pixel, vec4u(packed(id, z, sines), 0u, 0u));
+    if bend > STEP {
+        // Taps of the tiles beside this one reach it, too.
+        let place = pixel & vec2i(i32(TILE) - 1);
+        let beside = select(vec2i(0), vec2i(-1), place < vec2i(REACH)) + select(vec2i(0), vec2i(1), place >= vec2i(i32(TILE) - REACH));
+        let tile = pixel / i32(TILE);
+        tell(tile + vec2i(beside.x, 0), brightness);
+        tell(tile + vec2i(0, beside.y), brightness);
+    }
     atomicOr(&marks, (1u << coarsest_level(z, id)) | difficulty | (1u << (PROFILE_SHIFT + id - 1u)));
     atomicMax(&brightest, bitcast<u32>(brightness));
     atomicMax(&darkest, ~bitcast<u32>(brightness));

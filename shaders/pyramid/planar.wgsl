@@ -1,23 +1,21 @@
 // The blurs of a level on planar tiles: of one profile, and hardly bent or hardly of different light. What
 // taps weigh is found at the corners of a tile, all blurs in one, and lies evenly between. Follows blur.wgsl.
 
-// What the taps (i, j) and (−i, −j) weigh together in all blurs. In the last components, the weight of
-// all coarser levels, then the steps of the lattice.
+// `Taps`, those that all blurs share with the square's own. In the last components, the weight of all coarser levels.
 struct Corner {
     @builtin(position) at: vec4f,
     @location(0) @interpolate(linear) k00: vec4f,
     @location(1) @interpolate(linear) k10: vec4f,
     @location(2) @interpolate(linear) k01: vec4f,
-    @location(3) @interpolate(linear) k11: vec4f,
-    @location(4) @interpolate(linear) k1m: vec4f,
-    @location(5) @interpolate(linear) k20: vec4f,
-    @location(6) @interpolate(linear) k02: vec4f,
-    @location(7) @interpolate(linear) k21: vec4f,
-    @location(8) @interpolate(linear) k2m: vec4f,
-    @location(9) @interpolate(linear) k12: vec4f,
-    @location(10) @interpolate(linear) km2: vec4f,
-    @location(11) @interpolate(linear) k22: vec4f,
-    @location(12) @interpolate(linear) k2n: vec4f,
+    @location(3) @interpolate(linear) k11: vec3f,
+    @location(4) @interpolate(linear) k1m: vec3f,
+    @location(5) @interpolate(linear) k20: vec3f,
+    @location(6) @interpolate(linear) k02: vec3f,
+    @location(7) @interpolate(linear) s2: vec2f,
+    @location(8) @interpolate(linear) s3: vec4f,
+    @location(9) @interpolate(linear) square: vec3f,
+    @location(10) @interpolate(linear) wanted: vec3f,
+    @location(11) @interpolate(flat) lattice: vec4i,
 }
 
 fn shape_at(pixel: vec2i) -> vec2u {
@@ -58,23 +56,24 @@ fn vs_corner(
     let shape = shape_at(corner);
     let plane = plane_of(corner, unpacked(shape));
     let scale = scale_of(plane.m, in_middle.x >> 24u);
-    let blurs = blurs_at(plane, scale, lattice);
+    let taps = taps_of(plane, scale, lattice);
     let rest = rest_at(scale);
+    let s1 = exp2(taps.s1);
     var out = Corner();
     out.at = on_screen(tile, vertex);
-    out.k00 = vec4f(blurs.colors * vec4f(1.0), rest.r);
-    out.k10 = vec4f(blurs.colors * weights_at(blurs, 1, 0), rest.g);
-    out.k01 = vec4f(blurs.colors * weights_at(blurs, 0, 1), rest.b);
-    out.k11 = vec4f(blurs.colors * weights_at(blurs, 1, 1), f32(lattice.u.x));
-    out.k1m = vec4f(blurs.colors * weights_at(blurs, 1, -1), f32(lattice.u.y));
-    out.k20 = vec4f(blurs.colors * weights_at(blurs, 2, 0), f32(lattice.v.x));
-    out.k02 = vec4f(blurs.colors * weights_at(blurs, 0, 2), f32(lattice.v.y));
-    out.k21 = vec4f(blurs.colors[3] * square_weight_at(blurs, 2, 1), blurs.wanted.r);
-    out.k2m = vec4f(blurs.colors[3] * square_weight_at(blurs, 2, -1), blurs.wanted.g);
-    out.k12 = vec4f(blurs.colors[3] * square_weight_at(blurs, 1, 2), blurs.wanted.b);
-    out.km2 = vec4f(blurs.colors[3] * square_weight_at(blurs, -1, 2), f32(blurs.has_square));
-    out.k22 = vec4f(blurs.colors[3] * square_weight_at(blurs, 2, 2), 0.0);
-    out.k2n = vec4f(blurs.colors[3] * square_weight_at(blurs, 2, -2), 0.0);
+    out.k00 = vec4f(taps.k00 + taps.square, rest.r);
+    out.k10 = vec4f(taps.k10 + s1.x * taps.square, rest.g);
+    out.k01 = vec4f(taps.k01 + s1.y * taps.square, rest.b);
+    out.k11 = taps.k11 + s1.z * taps.square;
+    out.k1m = taps.k1m + s1.w * taps.square;
+    let s2 = exp2(taps.s2);
+    out.k20 = taps.k20 + s2.x * taps.square;
+    out.k02 = taps.k02 + s2.y * taps.square;
+    out.s2 = s2.zw;
+    out.s3 = exp2(taps.s3);
+    out.square = taps.square;
+    out.wanted = taps.wanted;
+    out.lattice = vec4i(lattice.u, lattice.v);
     return out;
 }
 
@@ -82,36 +81,42 @@ fn vs_corner(
 var<private> light: vec3f;
 var<private> mass: vec3f;
 
+fn both(pixel: vec2i, offset: vec2i) -> vec4f {
+    return textureLoad(here_light, pixel + offset, 0) + textureLoad(here_light, pixel - offset, 0);
+}
+
 fn pair(pixel: vec2i, offset: vec2i, k: vec3f) {
-    let both = textureLoad(here_light, pixel + offset, 0) + textureLoad(here_light, pixel - offset, 0);
-    light += k * both.rgb;
-    mass += k * both.a;
+    let there = both(pixel, offset);
+    light += k * there.rgb;
+    mass += k * there.a;
 }
 
 fn gathered(pixel: vec2i, here: vec4f, e: vec3f, tile: Corner) -> Gathered {
-    let u = vec2i(round(vec2f(tile.k11.a, tile.k1m.a)));
-    let v = vec2i(round(vec2f(tile.k20.a, tile.k02.a)));
+    let u = tile.lattice.xy;
+    let v = tile.lattice.zw;
     light = tile.k00.rgb * here.rgb;
     mass = tile.k00.rgb * here.a;
     pair(pixel, u, tile.k10.rgb);
     pair(pixel, v, tile.k01.rgb);
-    pair(pixel, u + v, tile.k11.rgb);
-    pair(pixel, u - v, tile.k1m.rgb);
+    pair(pixel, u + v, tile.k11);
+    pair(pixel, u - v, tile.k1m);
     if THIRTEEN {
-        pair(pixel, 2 * u, tile.k20.rgb);
-        pair(pixel, 2 * v, tile.k02.rgb);
+        pair(pixel, 2 * u, tile.k20);
+        pair(pixel, 2 * v, tile.k02);
     }
     if SQUARE {
-        if tile.km2.a > 0.0 {
-            pair(pixel, 2 * u + v, tile.k21.rgb);
-            pair(pixel, 2 * u - v, tile.k2m.rgb);
-            pair(pixel, u + 2 * v, tile.k12.rgb);
-            pair(pixel, 2 * v - u, tile.km2.rgb);
-            pair(pixel, 2 * u + 2 * v, tile.k22.rgb);
-            pair(pixel, 2 * u - 2 * v, tile.k2n.rgb);
+        if any(tile.square > vec3f(1e-6)) {
+            let outer = tile.s2.x * both(pixel, 2 * u + v)
+                + tile.s2.y * both(pixel, 2 * u - v)
+                + tile.s3.x * both(pixel, u + 2 * v)
+                + tile.s3.y * both(pixel, 2 * v - u)
+                + tile.s3.z * both(pixel, 2 * u + 2 * v)
+                + tile.s3.w * both(pixel, 2 * u - 2 * v);
+            light += tile.square * outer.rgb;
+            mass += tile.square * outer.a;
         }
     }
-    let wanted = vec3f(tile.k21.a, tile.k2m.a, tile.k12.a);
+    let wanted = tile.wanted;
     let blurred = blurred_by(light, mass, wanted, e);
     let rest = vec3f(tile.k00.a, tile.k10.a, tile.k01.a);
     // The texture may be larger than the level.
@@ -136,7 +141,7 @@ fn fs_frame(tile: Corner) -> @location(0) vec4f {
     let pixel = vec2i(tile.at.xy) - vec2i(view.first_pixel);
     let share = share_at(pixel);
     let here = textureLoad(here_light, pixel, 0);
-    if here.a <= 0.0 || share <= 0.0 {
+    if here.a <= 0.0 {
         discard;
     }
     let e = light_of(here);

@@ -24,13 +24,12 @@ struct View {
     // Of the viewport, in the textures of the host.
     first_pixel: vec2u,
     size: vec2u,
-    // How far planar blurs may be off in a tile by their looks, for it to be planar, and to be general.
-    planar_limit: f32,
-    general_limit: f32,
+    // How far planar blurs may be off in a tile by its looks, on the frame and on levels, for it to be planar.
+    frame_limit: f32,
+    level_limit: f32,
     // Levels above the frame.
     levels: u32,
-    // Where tiles that are summed directly are in lists.
-    first_direct: u32,
+    pad: u32,
 }
 
 // A Gaussian, cut off by a shape of taps.
@@ -66,16 +65,15 @@ struct Level {
 
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var<uniform> level: Level;
-// Of all levels; x in the low half. Of a level the planar ones from the front on, the general ones from the
-// end; those of the frame that are summed directly after all levels.
+// Of all levels; x in the low half. Of a level the planar ones from the front on, the others from the end.
 @group(0) @binding(2) var<storage, read> tiles: array<u32>;
 
 // Which tiles a pass is over.
 override CLASS: u32 = 0u;
 const PLANAR = 0u;
-const GENERAL = 1u;
-const DIRECT = 2u;
-const CLASSES = 3u;
+// Summed directly on the frame; on levels each pixel finds what its taps weigh.
+const CAREFUL = 1u;
+const CLASSES = 2u;
 
 // What a tile holds, a bit each, so that several together hold all of theirs: each level that light is needed
 // of; how difficult the surface is; whether there is anything but skin; each profile.
@@ -96,10 +94,8 @@ const LEAST_AREA = 1e-3;
 
 fn tile_of(instance: u32) -> vec2u {
     var place = level.first_tile + instance;
-    if CLASS == GENERAL {
+    if CLASS == CAREFUL {
         place = level.first_tile + level.tile_count - 1u - instance;
-    } else if CLASS == DIRECT {
-        place = view.first_direct + instance;
     }
     let tile = tiles[place];
     return vec2u(tile & 0xffffu, tile >> 16u);

@@ -138,16 +138,20 @@ pub(crate) struct Kernels {
 }
 
 impl Kernels {
-    /// Of the light that stays, of each blur of the frame, then of each of level 1 and so on: its variance in
-    /// square pixels of the frame.
-    pub(crate) fn variances_px2(&self, levels: usize) -> Vec<f64> {
-        let mut variances = vec![0.0];
-        variances.extend(self.fine.blurs().map(|b| b.variance_px2));
-        for l in 1..=levels as i32 {
-            let blurs = self.coarse.blurs();
-            variances.extend(blurs.map(|b| b.variance_px2 * f64::powi(4.0, l)));
+    /// Of the light that stays, of each blur of the frame, then of each of level 1 and so on: its level, and its
+    /// variance in square pixels of that level.
+    pub(crate) fn blurs(&self, levels: usize) -> Vec<(usize, f64)> {
+        let mut blurs = vec![(0, 0.0)];
+        blurs.extend(self.fine.blurs().map(|b| (0, b.variance_px2)));
+        for l in 1..=levels {
+            blurs.extend(self.coarse.blurs().map(|b| (l, b.variance_px2)));
         }
-        variances
+        blurs
+    }
+
+    /// The variances in square pixels of the frame.
+    pub(crate) fn variances_px2(&self, levels: usize) -> Vec<f64> {
+        self.blurs(levels).iter().map(|(l, v)| v * f64::powi(4.0, *l as i32)).collect()
     }
 }
 

@@ -187,6 +187,13 @@ impl Plan {
         self.weights().and_then(|w| w.profiles.get(profile)).map_or(&[], |rows| rows)
     }
 
+    /// What each of a row's [`weights`](Row::weights) weighs: the level that is blurred, 0 for the frame, and
+    /// the variance in square pixels of that level, what downsampling blurs by included. The light that stays
+    /// comes first. Empty for the exact effect.
+    pub fn blurs(&self) -> Vec<(usize, f64)> {
+        self.weights().map_or(Vec::new(), |w| w.kernels.blurs(w.levels))
+    }
+
     /// Texel fetches for a pixel of skin of a profile, counted from 0, on flat skin that faces the camera;
     /// `None` for the exact effect, and for a profile that the plan was not made for.
     pub fn fetches(&self, profile: usize, px_per_mm: f32) -> Option<f32> {

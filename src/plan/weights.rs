@@ -98,17 +98,21 @@ impl Weights {
         self.rest_slot(self.levels) + 1
     }
 
-    /// The weights as the shaders have them: of each profile the rows, of each row the slots, and in
-    /// the last component of its first one its level.
+    /// The weights as the shaders have them: of each profile the rows, of each row the slots. The last component
+    /// of its first one is its level, that of the second the id of the first profile that is equal.
     pub(crate) fn table(&self) -> Vec<Vec4> {
         let mut table = Vec::new();
-        for row in self.profiles.iter().flatten() {
+        let equal =
+            |rows: &Vec<Row>| self.profiles.iter().position(|first| first == rows).map_or(0, |i| i + 1);
+        let rows = self.profiles.iter().flat_map(|rows| rows.iter().map(move |row| (row, equal(rows))));
+        for (row, id) in rows {
             let weights: Vec<Vec3> = row.weights.iter().map(|w| Vec3::from(*w)).collect();
             let beyond = |l: usize| weights[self.slot(l + 1, 0)..].iter().sum::<Vec3>();
             let rest = (0..=self.levels).map(beyond);
             let first = table.len();
             table.extend(weights.iter().copied().chain(rest).map(|w| w.extend(0.0)));
             table[first].w = row.level as f32;
+            table[first + 1].w = id as f32;
         }
         table
     }

@@ -18,11 +18,11 @@ pub(crate) use passes::OVERLAY;
 use passes::{LIGHT, OverTiles, Passes};
 use scratch::{CLASSES, DRAW_BYTES, Scratch};
 
-/// What doubt (`list_tiles.wgsl`) there may be in a tile for it to be planar. Found on heads: beyond, errors grow.
-const PLANAR_LIMIT: f32 = 0.7;
-/// What doubt, over the error of the plan and at most in all, there may be for it not to be summed directly.
-const GENERAL_LIMIT_ERRORS: f32 = 150.0;
-const GENERAL_LIMIT: f32 = 0.8;
+/// What doubt (`list_tiles.wgsl`) there may be in a tile of the frame for it to be planar, over the error of the
+/// plan and at most in all, and in one of a level. Found on heads: beyond, errors grow.
+const FRAME_LIMIT_ERRORS: f32 = 98.0;
+const FRAME_LIMIT: f32 = 0.52;
+const LEVEL_LIMIT: f32 = 0.7;
 
 /// The passes of a plan, and its weights.
 #[derive(Debug)]
@@ -70,6 +70,19 @@ pub(crate) struct Seen<'a> {
     pub(crate) contents: &'a Buffer,
     pub(crate) depth: &'a TextureView,
     pub(crate) profile_id: &'a TextureView,
+}
+
+/// By what a device drew the last frame of a view, for tools that count it.
+#[derive(Debug)]
+pub struct Tiles<'a> {
+    /// Indirect draws: of each level one of the planar tiles and one of the others, its second word their number.
+    /// `COPY_SRC`.
+    pub draws: &'a Buffer,
+    /// Tiles, x in the low half of a word: of each level, the frame first, as many words as it has tiles, the
+    /// planar ones from the front on, the others from the end. `COPY_SRC`.
+    pub list: &'a Buffer,
+    /// Columns and rows of tiles of each level.
+    pub levels: Vec<[u32; 2]>,
 }
 
 /// What is bound of a host's.
@@ -156,10 +169,10 @@ impl Pyramid {
             profiles: plan.profiles.len() as u32,
             first_pixel: frame.rectangle().first(),
             size: size.into(),
-            planar_limit: PLANAR_LIMIT,
-            general_limit: GENERAL_LIMIT.min(GENERAL_LIMIT_ERRORS * plan.predicted_error()),
+            frame_limit: FRAME_LIMIT.min(FRAME_LIMIT_ERRORS * plan.predicted_error()),
+            level_limit: LEVEL_LIMIT,
             levels: view.scratch.levels.len() as u32 - 1,
-            first_direct: view.scratch.tile_count,
+            pad: 0,
         };
         queue.write_buffer(&view.scratch.view, 0, bytemuck::bytes_of(&numbers));
         let read = Textures {
@@ -215,6 +228,7 @@ impl Pyramid {
             if l == 0 {
                 resources.push((4, Texture(&read.strength)));
                 resources.push((5, Texture(&read.albedo)));
+                resources.push((6, Texture(&read.irradiance)));
                 resources.push((13, scratch.steps.as_entire_binding()));
                 resources.push((14, Texture(&scratch.lights)));
                 resources.push((15, Texture(&scratch.shapes)));
@@ -265,7 +279,14 @@ impl Pyramid {
             frame: blur(&passes.frame, 0),
             copy: group(
                 &passes.copy_layout,
-                &[(0, view.clone()), (4, Texture(&read.irradiance)), (5, Texture(&read.albedo))],
+                &[
+                    (0, view.clone()),
+                    (4, Texture(&read.irradiance)),
+                    (5, Texture(&read.albedo)),
+                    (8, Texture(&base.shape)),
+                    (9, scratch.grids.as_entire_binding()),
+                    (10, scratch.contents.as_entire_binding()),
+                ],
             ),
             read,
         }
@@ -284,6 +305,15 @@ impl Pyramid {
             depth: &groups.read.depth,
             profile_id: &groups.read.profile_id,
         })
+    }
+
+    pub(crate) fn tiles(view: &PyramidView) -> Tiles<'_> {
+        let scratch = &view.scratch;
+        Tiles {
+            draws: &scratch.draws,
+            list: &scratch.list,
+            levels: scratch.levels.iter().map(|level| level.tiles).collect(),
+        }
     }
 
     /// Records the frame that was last prepared.
@@ -330,7 +360,8 @@ impl Pyramid {
         if !self.output.is_difference() {
             pass.set_pipeline(&passes.copy);
             pass.set_bind_group(0, &groups.copy, &[]);
-            pass.draw(0..3, 0..1);
+            let [x, y] = coarser.first().map_or([0, 0], |level| level.tiles);
+            pass.draw(0..4, 0..x * y);
         }
         over_tiles(&mut pass, &passes.frame, &groups.frame, scratch, 0);
     }

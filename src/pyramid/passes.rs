@@ -30,7 +30,7 @@ const DOWNSAMPLE: &[&str] = &[SURFACE, wgsl!("downsample")];
 pub(super) const PLANAR: &[&str] = &[SURFACE, BLUR, wgsl!("planar")];
 const GENERAL: &[&str] = &[SURFACE, BLUR, wgsl!("general")];
 pub(super) const DIRECT: &[&str] = &[SURFACE, BLUR, wgsl!("direct")];
-const COPY: &[&str] = &[SURFACE, wgsl!("copy")];
+const COPY: &[&str] = &[SURFACE, TILES, wgsl!("copy")];
 /// Of [`Overlay`](crate::Overlay).
 pub(crate) const OVERLAY: &[&str] = &[SURFACE, HOST, TILES, wgsl!("overlay")];
 
@@ -40,7 +40,7 @@ pub(super) struct Compute {
     pub pipeline: ComputePipeline,
 }
 
-/// Pipelines over the tiles of a level, by their class: planar, general, and on the frame direct.
+/// Pipelines over the tiles of a level, by their class.
 #[derive(Debug)]
 pub(super) struct OverTiles {
     pub layout: BindGroupLayout,
@@ -77,7 +77,7 @@ impl Passes {
             let at = ShaderStages::VERTEX_FRAGMENT;
             let layout = gpu::layout(device, &label, at, bindings);
             let targets: Vec<_> = match entry {
-                "fs_frame" => vec![Some(output.target(ColorWrites::COLOR))],
+                "fs_frame" => vec![Some(output.target(ColorWrites::ALL))],
                 _ => targets.iter().map(|t| Some((*t).into())).collect(),
             };
             let flag = |on| f64::from(u8::from(on));
@@ -89,7 +89,7 @@ impl Passes {
                         ("THIRTEEN", flag(kinds.shape == Shape::Thirteen)),
                         ("SQUARE", flag(kinds.square_px2.is_some())),
                         ("FINEST", flag(entry == "fs_frame")),
-                        ("DIFFERENCE", flag(output.adds())),
+                        ("DIFFERENCE", flag(output.is_difference())),
                     ]);
                 }
                 let module: ShaderModule = gpu::module(device, &label, files);
@@ -121,14 +121,14 @@ impl Passes {
         ];
         let frame: Vec<_> = level
             .into_iter()
-            .chain([(4, FLOATS), (5, FLOATS), (13, UNIFORM), (14, FLOATS), (15, UINTS)])
+            .chain([(4, FLOATS), (5, FLOATS), (6, FLOATS), (13, UNIFORM), (14, FLOATS), (15, UINTS)])
             .collect();
         let copy_label = "subsurface::pyramid fs_copy";
         let copy_layout = gpu::layout(
             device,
             copy_label,
-            ShaderStages::FRAGMENT,
-            &[(0, UNIFORM), (4, FLOATS), (5, FLOATS)],
+            ShaderStages::VERTEX_FRAGMENT,
+            &[(0, UNIFORM), (4, FLOATS), (5, FLOATS), (8, UINTS), (9, UNIFORM), (10, READ)],
         );
         Self {
             pack: compute(
@@ -168,7 +168,7 @@ impl Passes {
             ),
             frame: over_tiles(
                 "fs_frame",
-                &[("vs_corner", PLANAR), ("vs_tile", GENERAL), ("vs_tile", DIRECT)],
+                &[("vs_corner", PLANAR), ("vs_tile", DIRECT)],
                 &frame,
                 &[],
                 Some(&plan.kernels.fine),
@@ -176,10 +176,10 @@ impl Passes {
             copy: gpu::Draw {
                 label: copy_label,
                 module: &gpu::module(device, copy_label, COPY),
-                vertex: "vs_frame",
+                vertex: "vs_copy",
                 fragment: "fs_copy",
                 layout: &copy_layout,
-                topology: PrimitiveTopology::TriangleList,
+                topology: PrimitiveTopology::TriangleStrip,
                 targets: &[Some(output.target(ColorWrites::ALL))],
                 constants: &[],
             }

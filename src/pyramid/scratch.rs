@@ -1,12 +1,12 @@
 //! What a frame of one size needs, for one plan.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{UVec2, UVec4, Vec2, Vec4};
+use glam::{UVec2, UVec4, Vec2, Vec3, Vec4};
 use wgpu::{Buffer, BufferUsages, Device, Queue, TextureView};
 
 use super::passes::{LIGHT, SHAPE};
 use crate::gpu;
-use crate::plan::{MAX_LEVELS, Shape, Weights, own_blur};
+use crate::plan::{Kinds, MAX_LEVELS, Shape, Weights, own_blur};
 
 /// Side of a tile, in pixels of its level.
 pub(super) const TILE: u32 = 8;
@@ -28,10 +28,10 @@ pub(super) struct View {
     pub profiles: u32,
     pub first_pixel: UVec2,
     pub size: UVec2,
-    pub planar_limit: f32,
-    pub general_limit: f32,
+    pub frame_limit: f32,
+    pub level_limit: f32,
     pub levels: u32,
-    pub first_direct: u32,
+    pub pad: u32,
 }
 
 /// `Blur` of surface.wgsl.
@@ -65,18 +65,22 @@ struct Level {
 #[repr(C)]
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
 struct Step {
-    variances: [f32; 2],
+    variances: Vec3,
     level: u32,
     slot: u32,
+    pad: [u32; 3],
 }
 
-/// Gaussians of the frame in twos, then a step for each level.
+/// The narrow blurs of the frame, its wide ones, then those of each level.
 pub(super) const STEPS: usize = 2 + MAX_LEVELS;
+
+/// Blurs of the frame from this variance on are not summed together with narrower ones.
+const WIDE_PX2: f32 = 1.0;
 
 /// Bytes of a `Draw` of list_tiles.wgsl.
 pub(super) const DRAW_BYTES: u64 = 16;
 /// Draws of a level, one for each class of tiles.
-pub(super) const CLASSES: u64 = 3;
+pub(super) const CLASSES: u64 = 2;
 /// Words of what a tile holds.
 const CONTENTS: u32 = 3;
 
@@ -98,8 +102,6 @@ pub(super) struct Scratch {
     pub lights: TextureView,
     pub shapes: TextureView,
     pub levels: Vec<LevelScratch>,
-    /// Tiles of all levels.
-    pub tile_count: u32,
     /// Means of level 1 and of level 2, and by turns of those above.
     pub means: [TextureView; 2],
 }
@@ -149,7 +151,7 @@ pub(super) fn bytes(size: [u32; 2], plan: &Weights) -> u64 {
     };
     let levels: u64 = (0..=level_count(size, plan)).map(of_level).sum();
     let means = [1, 2].map(|l| 8 * count(size_of_level(size, l)));
-    levels + means.iter().sum::<u64>() + 4 * count(tiles_of_level(size, 0))
+    levels + means.iter().sum::<u64>()
 }
 
 impl Scratch {
@@ -223,11 +225,7 @@ impl Scratch {
                 CONTENTS * first_tile,
                 BufferUsages::COPY_DST,
             ),
-            list: words(
-                "subsurface::pyramid tiles",
-                first_tile + levels[0].tiles[0] * levels[0].tiles[1],
-                BufferUsages::empty(),
-            ),
+            list: words("subsurface::pyramid tiles", first_tile, BufferUsages::COPY_SRC),
             draws: words(
                 "subsurface::pyramid draws",
                 no_draws.len() as u32,
@@ -242,7 +240,6 @@ impl Scratch {
             lights: lights.create_view(&Default::default()),
             shapes: shapes.create_view(&Default::default()),
             levels,
-            tile_count: first_tile,
             means: [mean(1), mean(2)],
         }
     }
@@ -265,19 +262,18 @@ impl Scratch {
 
 fn steps(plan: &Weights, last: usize) -> [Step; STEPS] {
     let mut steps = [Step::default(); STEPS];
-    let mut next = steps.iter_mut();
-    for l in 0..=last {
-        let kinds = if l == 0 { plan.kernels.fine } else { plan.kernels.coarse };
-        let variances: Vec<f32> = kinds.blurs().map(|b| b.variance_px2 as f32).collect();
-        for (pair, j) in variances.chunks(2).zip((0..).step_by(2)) {
-            if let Some(step) = next.next() {
-                *step = Step {
-                    variances: [pair[0], pair.get(1).copied().unwrap_or(0.0)],
-                    level: l as u32,
-                    slot: plan.slot(l, j) as u32,
-                };
-            }
-        }
+    let step = |l: usize, first: usize, variances: &[f32]| {
+        let variance = |j: usize| variances.get(j).copied().unwrap_or(0.0);
+        let variances = Vec3::new(variance(0), variance(1), variance(2));
+        Step { variances, level: l as u32, slot: plan.slot(l, first) as u32, pad: [0; 3] }
+    };
+    let of = |kinds: &Kinds| kinds.blurs().map(|b| b.variance_px2 as f32).collect::<Vec<_>>();
+    let (fine, coarse) = (of(&plan.kernels.fine), of(&plan.kernels.coarse));
+    let narrow = fine.partition_point(|variance| *variance < WIDE_PX2);
+    steps[0] = step(0, 0, &fine[..narrow]);
+    steps[1] = step(0, narrow, &fine[narrow..]);
+    for l in 1..=last {
+        steps[l + 1] = step(l, 0, &coarse);
     }
     steps
 }
@@ -353,10 +349,10 @@ mod tests {
                 profiles,
                 first_pixel,
                 size,
-                planar_limit,
-                general_limit,
+                frame_limit,
+                level_limit,
                 levels,
-                first_direct
+                pad
             }
         );
         assert_layout!(&PLANAR.concat(), "Blur", Blur { variance, own, limit, narrow, sharpness, slot });

@@ -34,6 +34,8 @@ mod svg;
 pub mod synthetic;
 #[cfg(feature = "programs")]
 pub mod truth;
+#[cfg(feature = "programs")]
+pub mod uses;
 #[cfg(test)]
 mod wgsl;
 

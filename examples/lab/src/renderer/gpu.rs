@@ -190,6 +190,14 @@ impl Gpu {
         readback
     }
 
+    /// The bytes of a buffer that may be copied.
+    pub fn read_buffer(&self, buffer: &wgpu::Buffer) -> Vec<u8> {
+        let bytes = buffer.size();
+        let readback = Readback::new(self, [bytes as u32; 2], 1);
+        self.run(|encoder| encoder.copy_buffer_to_buffer(buffer, 0, &readback.buffer, 0, bytes));
+        self.wait_for(readback)
+    }
+
     /// Maps what was copied, and waits for it.
     pub(super) fn wait_for(&self, readback: Readback) -> Vec<u8> {
         readback.buffer.map_async(wgpu::MapMode::Read, .., |_| {});

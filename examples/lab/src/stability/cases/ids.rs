@@ -19,7 +19,7 @@ pub fn cases(quick: bool) -> Vec<Case> {
     let mut cases = masks(quick);
     let odd_pixels = |ratio, at_most: [f64; 2]| odd_pixels(ratio, quick, at_most);
     cases.extend([
-        odd_pixels(1.2, [0.005, 0.008]),
+        odd_pixels(1.2, [0.0062, 0.008]),
         odd_pixels(1.33, [0.0172, 0.0172]),
         odd_pixels(2.0, [0.0088, 0.0088]),
         odd_pixels(3.0, [0.0141, 0.018]),
@@ -86,10 +86,10 @@ fn masks(quick: bool) -> Vec<Case> {
     vec![
         case("ids meet in a line", PROMISE, [0.015, 0.018], |p| p.y < 0.0),
         case("half of the ids, at random", GRADIENT, [0.034, 0.044], at_random).pictured(false),
-        case("a net of ids", GRADIENT, [0.008, 0.027], threads),
+        case("a net of ids", GRADIENT, [0.022, 0.027], threads),
         case("straps of ids", GRADIENT, [0.027, 0.03], straps).pictured(false),
         case("a hole of ids", GRADIENT, [0.0195, 0.0195], |p| p.length() < 3.0).pictured(false),
-        case("patches of ids", GRADIENT, [0.0086, 0.045], patches).pictured(false),
+        case("patches of ids", GRADIENT, [0.02, 0.045], patches).pictured(false),
     ]
 }
 
