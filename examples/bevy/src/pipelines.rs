@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use bevy::asset::{AssetServer, Handle, load_embedded_asset};
 use bevy::core_pipeline::prepass::DeferredPrepass;
 use bevy::ecs::prelude::{Commands, Component, Entity, Query, Res, ResMut, Resource, With};
-use bevy::pbr::deferred::{DeferredLightingLayout, PbrDeferredLightingDepthId};
+use bevy::pbr::deferred::{DeferredLightingLayout, DeferredLightingPipeline, PbrDeferredLightingDepthId};
 use bevy::pbr::{MeshPipelineKey, ViewKeyCache};
 use bevy::render::camera::ExtractedCamera;
 use bevy::render::render_resource::binding_types::{texture_2d, uniform_buffer};
@@ -98,11 +98,12 @@ pub(crate) fn init_layouts(
     });
 }
 
-/// Queues the pipelines of each camera that scatters; Bevy makes them off the render thread.
+/// Queues the pipelines of each camera that scatters, once Bevy's own is there; Bevy makes them off the render
+/// thread.
 pub(crate) fn queue_pipelines(
     mut commands: Commands,
     cameras: Query<
-        (Entity, &ExtractedView),
+        (Entity, &ExtractedView, &DeferredLightingPipeline),
         (With<ExtractedCamera>, With<DeferredPrepass>, With<SubsurfaceScattering>),
     >,
     cache: Res<PipelineCache>,
@@ -114,7 +115,10 @@ pub(crate) fn queue_pipelines(
     let (Some(bevys), Some(layouts)) = (bevys, layouts) else {
         return;
     };
-    for (entity, view) in &cameras {
+    for (entity, view, of_bevy) in &cameras {
+        if cache.get_render_pipeline(of_bevy.pipeline_id).is_none() {
+            continue;
+        }
         let Some(key) = keys.get(&view.retained_view_entity) else {
             continue;
         };
