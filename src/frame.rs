@@ -51,8 +51,7 @@ pub struct Frame<'a> {
     /// Default, `None`: all.
     pub viewport: Option<Viewport>,
     /// The surface right behind the visible one, for light that comes through thin parts and around rims.
-    /// Default, `None`: what the camera does not see scatters nothing. [`Plan::exact`](crate::Plan::exact)
-    /// alone looks at it.
+    /// Default, `None`: what the camera does not see scatters nothing.
     pub back: Option<BackLayer<'a>>,
 }
 

@@ -72,7 +72,7 @@ impl ScreenSpace {
     /// Bytes that it takes on top where frames have a [`BackLayer`](crate::BackLayer).
     pub fn back_scratch_bytes(&self, size: [u32; 2]) -> u64 {
         match &self.shared.passes {
-            Passes::Pyramid(_) => 0,
+            Passes::Pyramid(pyramid) => pyramid.back_scratch_bytes(size),
             Passes::Exact(_) => exact::back_scratch_bytes(size),
         }
     }
@@ -131,7 +131,8 @@ impl View {
         match passes {
             Passes::Pyramid(pyramid) => {
                 Optics::check_depth_alone(frame)?;
-                pyramid.prepare(device, queue, &mut self.pyramid, frame, &optics);
+                let profiles = plan.profiles();
+                pyramid.prepare(device, queue, &mut self.pyramid, frame, &optics, profiles);
             }
             Passes::Exact(exact) => {
                 let profiles = plan.profiles();

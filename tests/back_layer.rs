@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec3};
 use subsurface::wgpu::TextureFormat;
 use subsurface::{Plan, Profile, Viewport};
-use subsurface_lab::method;
+use subsurface_lab::method::{self, Ours};
 use subsurface_lab::renderer::{BackRenderer, Camera, Lighting, Renderer, Scene, Sky, View as CameraView};
 use subsurface_lab::synthetic::*;
 use subsurface_lab::truth::closed_form::{scattered_cosine, through_slab};
@@ -12,6 +12,11 @@ const FULL: TextureFormat = TextureFormat::Rgba32Float;
 
 fn exact() -> Plan {
     Plan::exact(&[Profile::SKIN]).unwrap()
+}
+
+/// The exact sum, and a plan at the default error.
+fn both() -> [Plan; 2] {
+    [exact(), Plan::skin()]
 }
 
 /// A slab seen from the front, of light on its near and far face; and the layer of the far one.
@@ -46,10 +51,12 @@ fn even_light_on_all_sides_stays_even() {
         view.shoot(sphere_back(10.0, 60.0, |_| DVec3::ONE)),
     ];
     for [front, back] in [slab(2.0, [1.0; 2]), ball] {
-        let out = front.scatter_over(Some(&back), &mut ours(&exact(), FULL), |_| ());
-        let error = worst(&out, &skin(&front), |_| DVec3::ONE);
-        // Full floats throughout.
-        assert!(error <= 1e-4, "{error}");
+        // Full floats throughout, and half floats between the passes of a plan.
+        for (plan, at_most) in both().iter().zip([1e-4, 1e-3]) {
+            let out = front.scatter_over(Some(&back), &mut ours(plan, FULL), |_| ());
+            let error = worst(&out, &skin(&front), |_| DVec3::ONE);
+            assert!(error <= at_most, "{error}");
+        }
     }
 }
 
@@ -69,11 +76,13 @@ fn even_light_on_a_closed_head_stays_even() {
     let mut frame = renderer.gbuffer.frame(camera.projection(size), 1000.0);
     frame.back = Some(back.layer());
     let output = gpu.target("scattered", size, FULL);
-    method::scatter(gpu, &mut ours(&exact(), FULL), &frame, &output).unwrap();
     let ids = gpu.read_bytes(renderer.gbuffer.profile_id.texture());
     let skin: Vec<usize> = (0..ids.len()).filter(|i| ids[*i] == 1).collect();
-    let error = worst(&gpu.read(&output), &skin, |_| DVec3::ONE);
-    assert!(!skin.is_empty() && error <= 0.001, "{error}");
+    for plan in &both() {
+        method::scatter(gpu, &mut ours(plan, FULL), &frame, &output).unwrap();
+        let error = worst(&gpu.read(&output), &skin, |_| DVec3::ONE);
+        assert!(!skin.is_empty() && error <= 0.001, "{error}");
+    }
 }
 
 #[test]
@@ -81,10 +90,15 @@ fn a_slab_passes_what_eq_7_says() {
     for thickness_mm in [0.5, 1.5, 2.0, 4.0, 8.0] {
         let [front, back] = slab(thickness_mm, [0.0, 1.0]);
         let [_, through] = through_slab(thickness_mm, &Profile::SKIN);
-        let out = front.scatter_over(Some(&back), &mut ours(&exact(), FULL), |_| ());
-        let error = worst(&out, &[48 * 96 + 48], |_| through);
-        println!("{thickness_mm} mm: exact {error:.5} of {:.3}", through.x);
-        assert!(error <= 0.001, "{thickness_mm} mm: {error}");
+        // A plan mixes Gaussians of other widths, which agree less on a gap than on an edge, and sums those of a
+        // level as one: least where a gap is as wide as the narrow ones, 2 px.
+        let planned = if thickness_mm < 1.0 { 0.025 } else { 0.01 };
+        for (plan, at_most) in both().iter().zip([0.001, planned]) {
+            let out = front.scatter_over(Some(&back), &mut ours(plan, FULL), |_| ());
+            let error = worst(&out, &[48 * 96 + 48], |_| through);
+            println!("{thickness_mm} mm: {error:.5} of {:.3}", through.x);
+            assert!(error <= at_most, "{thickness_mm} mm: {error}");
+        }
     }
 }
 
@@ -108,34 +122,41 @@ fn a_ball_lit_from_behind_is_that_of_eq_7() {
 
 #[test]
 fn what_is_far_behind_or_of_another_profile_changes_nothing() {
-    let mut exact = ours(&exact(), FULL);
+    for plan in &both() {
+        nothing_changes(&mut ours(plan, FULL));
+    }
+}
+
+fn nothing_changes(ours: &mut Ours) {
     let [front, mut far] = slab(40.0, [0.5, 1.0]);
-    let alone = front.scatter_by(&mut exact, |_| ());
-    assert_eq!(front.scatter_over(Some(&far), &mut exact, |_| ()), alone, "far behind");
+    let alone = front.scatter_by(ours, |_| ());
+    assert_eq!(front.scatter_over(Some(&far), ours, |_| ()), alone, "far behind");
     for hit in &mut far.hits {
         *hit = None;
     }
-    assert_eq!(front.scatter_over(Some(&far), &mut exact, |_| ()), alone, "nothing behind");
+    assert_eq!(front.scatter_over(Some(&far), ours, |_| ()), alone, "nothing behind");
     let [_, mut other] = slab(1.0, [0.5, 1.0]);
     for hit in other.hits.iter_mut().flatten() {
         hit.id = 2;
     }
-    assert_eq!(front.scatter_over(Some(&other), &mut exact, |_| ()), alone, "another profile");
+    assert_eq!(front.scatter_over(Some(&other), ours, |_| ()), alone, "another profile");
     // And again: a layer leaves nothing behind.
     let [_, near] = slab(1.0, [0.5, 1.0]);
-    assert_ne!(front.scatter_over(Some(&near), &mut exact, |_| ()), alone);
-    assert_eq!(front.scatter_by(&mut exact, |_| ()), alone, "the layer is gone");
+    assert_ne!(front.scatter_over(Some(&near), ours, |_| ()), alone);
+    assert_eq!(front.scatter_by(ours, |_| ()), alone, "the layer is gone");
 }
 
 #[test]
 fn without_ids_of_its_own_a_back_is_of_the_pixels_profile() {
     let [front, back] = slab(1.5, [0.0, 1.0]);
-    let mut exact = ours(&exact(), FULL);
-    let with = front.scatter_over(Some(&back), &mut exact, |_| ());
-    let without = front.scatter_over(Some(&back), &mut exact, |frame| {
-        frame.back = frame.back.map(|back| subsurface::BackLayer { profile_id: None, ..back });
-    });
-    assert_eq!(with, without);
+    for plan in &both() {
+        let mut ours = ours(plan, FULL);
+        let with = front.scatter_over(Some(&back), &mut ours, |_| ());
+        let without = front.scatter_over(Some(&back), &mut ours, |frame| {
+            frame.back = frame.back.map(|back| subsurface::BackLayer { profile_id: None, ..back });
+        });
+        assert_eq!(with, without);
+    }
 }
 
 #[test]

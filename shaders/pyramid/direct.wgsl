@@ -10,6 +10,12 @@
 @group(0) @binding(13) var<uniform> steps: array<Step, STEPS>;
 @group(0) @binding(14) var lights: texture_2d<f32>;
 @group(0) @binding(15) var shapes: texture_2d<u32>;
+// The same of the layer behind.
+@group(0) @binding(16) var back_lights: texture_2d<f32>;
+@group(0) @binding(17) var back_shapes: texture_2d<u32>;
+
+// Whether there is a layer behind.
+override BACK: bool = false;
 
 // Gaussians of a level that are summed as one.
 struct Step {
@@ -29,6 +35,12 @@ const LEAST_WEIGHT = 0.004;
 
 // Weights are max(1 − r²/8v, 0)², whose variance is v: near to a Gaussian, and 0 beyond √8 σ.
 const CUT = 8.0;
+
+// Across a gap t weights that end fade otherwise than e^(−t²/2v). Where a layer is near both have Gaussians that
+// are cut off where the others end, exp(−3.59 r²/8v) of variance v; what e^(−t²/2v) fades more by is told apart.
+const CUT_GAUSSIAN = 3.59;
+// Gaussians whose σ is less than this part of what lies between the layers do not cross it.
+const CROSSING_SIGMAS = 3.5;
 
 // Weights of single pixels are wider than what they spread by: in square pixels.
 const NARROWEST_IN_SPACE = 0.25;
@@ -108,6 +120,17 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
         let step_x = view.step.xz * side;
         let first_x = view.origin.xz + 0.5 * step_x - vec2f(0.0, p.x);
         let first_y = view.origin.yw + 0.5 * view.step.yw * side - vec2f(0.0, p.y);
+        var is_thin = false;
+        var across = 0.0;
+        if BACK {
+            let behind = textureLoad(back_shapes, clamp(vec2i(round(center)), first, last), step.level).rg;
+            let gap = shape.z - bitcast<f32>(behind.y);
+            let is_far = gap * gap > CROSSING_SIGMAS * CROSSING_SIGMAS * variance_mm2;
+            is_thin = behind.x >> 24u != shape.id || !is_far;
+            // As far as the layers are apart along the normal.
+            let apart2 = gap * gap / (1.0 + dot(shape.tangent, shape.tangent));
+            across = select(0.0, exp((CUT_GAUSSIAN - 0.5 * CUT) * apart2 * in_space), behind.x >> 24u == shape.id);
+        }
         var sum = vec4f(0.0);
         for (var y = first.y; y <= last.y; y++) {
             let dy = f32(y) - center.y;
@@ -124,8 +147,21 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
                 let row_x = first_x + step_x * f32(x);
                 let off = vec3f(row_x.x * z + row_x.y, row_y.x * z + row_y.y, z - p.z);
                 let dx = f32(x) - center.x;
-                let near = saturate(rest - dx * (k.x * dx + k01) - dot(off, off) * in_space);
-                sum += select(0.0, near * near, there.x >> 24u == shape.id) * light;
+                let near = rest - dx * (k.x * dx + k01) - dot(off, off) * in_space;
+                var weight = saturate(near) * saturate(near);
+                if BACK {
+                    if is_thin {
+                        weight = select(0.0, exp(CUT_GAUSSIAN * (min(near, 1.0) - 1.0)), near > 0.0);
+                        let behind = textureLoad(back_shapes, vec2i(x, y), step.level).rg;
+                        let z = bitcast<f32>(behind.y);
+                        let off = vec3f(row_x.x * z + row_x.y, row_y.x * z + row_y.y, z - p.z);
+                        let near = rest - dx * (k.x * dx + k01) - dot(off, off) * in_space;
+                        let w = across * exp(CUT_GAUSSIAN * (min(near, 1.0) - 1.0));
+                        let is_same = behind.x >> 24u == shape.id;
+                        sum += select(0.0, w, is_same) * textureLoad(back_lights, vec2i(x, y), step.level);
+                    }
+                }
+                sum += select(0.0, weight, there.x >> 24u == shape.id) * light;
             }
         }
         g.light += passed * select(e, sum.rgb / sum.a, sum.a > 1e-6);

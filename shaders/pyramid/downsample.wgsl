@@ -11,7 +11,7 @@
 fn fs_downsample(@builtin(position) at: vec4f) -> Surface {
     let pixel = vec2i(at.xy);
     if CLASS == CAREFUL {
-        return of_one_surface(pixel);
+        return of_one_surface(pixel, 1.0);
     }
     return of_all(pixel);
 }
@@ -44,8 +44,8 @@ fn of_all(pixel: vec2i) -> Surface {
     return Surface(half_floats(0.25 * light), packed(id, z / count, sines / count));
 }
 
-// The surface is that of the nearest of the four pixels that this one covers.
-fn of_one_surface(pixel: vec2i) -> Surface {
+// The surface is that of the nearest of the four pixels that this one covers; of the farthest where `side` is −1.
+fn of_one_surface(pixel: vec2i, side: f32) -> Surface {
     let none = Surface(vec4f(0.0), vec2u(0u));
     let last = vec2i(textureDimensions(finer_shape)) - 1;
     var reference = vec2u(0u);
@@ -55,9 +55,9 @@ fn of_one_surface(pixel: vec2i) -> Surface {
         if all(q <= last) {
             let there = textureLoad(finer_shape, q, 0).rg;
             let z = bitcast<f32>(there.y);
-            if there.x >> 24u != 0u && z > nearest {
+            if there.x >> 24u != 0u && side * z > nearest {
                 reference = there;
-                nearest = z;
+                nearest = side * z;
             }
         }
     }
@@ -65,6 +65,7 @@ fn of_one_surface(pixel: vec2i) -> Surface {
     if surface.id == 0u {
         return none;
     }
+    nearest *= side;
     let mm = mm_per_px(nearest);
     let slope2 = dot(surface.tangent, surface.tangent);
     let tolerance = TOLERANCE * max(mm.x, mm.y) * sqrt(1.0 + slope2);

@@ -7,6 +7,8 @@
 @group(0) @binding(10) var<storage, read> contents: array<u32>;
 @group(0) @binding(11) var<storage, read_write> draws: array<Draw>;
 @group(0) @binding(12) var<storage, read_write> list: array<u32>;
+// As in pack_back.wgsl; looked at where there is a back layer.
+@group(0) @binding(13) var<storage, read> back_tiles: array<u32>;
 
 struct Draw {
     vertices: u32,
@@ -84,7 +86,9 @@ fn class_of(tile: vec2i, l: u32) -> u32 {
         if has_odd_pixels() {
             near = around;
         }
-        doubted = doubt(near, 0u) > view.frame_limit;
+        let word = grids[0].z + u32(tile.y) * grids[0].x + u32(tile.x);
+        let has_back = view.back_reach > 0.0 && (back_tiles[word] & 1u) != 0u;
+        doubted = has_back || doubt(near, 0u) > view.frame_limit;
     }
     return select(PLANAR, CAREFUL, mixes || doubted);
 }

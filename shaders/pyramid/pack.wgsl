@@ -90,14 +90,18 @@ fn tell(tile: vec2i, brightness: f32) {
     }
 }
 
-// Packs a pixel of the viewport, and adds what it holds to what its tile does.
-fn pack(pixel: vec2i) {
-    let pixel_of_host = vec2i(view.first_pixel) + pixel;
-    let here = host_surface(pixel);
-    if here.id == 0u || here.id > view.profiles {
-        atomicOr(&marks, NOT_SKIN);
-        return;
-    }
+// A pixel of skin.
+struct Packed {
+    light: vec4f,
+    shape: vec2u,
+    difficulty: u32,
+    // The largest second difference of depth, in pixel widths.
+    bend: f32,
+    // The brightest color; endless where light is no number.
+    brightness: f32,
+}
+
+fn packed_at(pixel: vec2i, here: HostSurface) -> Packed {
     let id = u32(weights[(here.id - 1u) * view.rows * view.stride + 1u].w);
     let z = here.z;
     let last = vec2i(view.size) - 1;
@@ -118,7 +122,7 @@ fn pack(pixel: vec2i) {
     let plane = plane_of(pixel, shape);
     let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
     let sines = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);
-    let host = textureLoad(irradiance, pixel_of_host, 0).rgb;
+    let host = textureLoad(irradiance, vec2i(view.first_pixel) + pixel, 0).rgb;
     var light = vec4f(0.0);
     var difficulty = difficulty_bits(bend);
     var brightness = MOST_LIGHT;
@@ -130,19 +134,32 @@ fn pack(pixel: vec2i) {
         // do not look for.
         difficulty = difficulty_bits(MOST_LIGHT);
     }
-    textureStore(packed_light, pixel, half_floats(light));
-    textureStore(packed_shape, pixel, vec4u(packed(id, z, sines), 0u, 0u));
-    if bend > STEP {
+    return Packed(half_floats(light), packed(id, z, sines), difficulty, bend, brightness);
+}
+
+// Packs a pixel of the viewport, and adds what it holds to what its tile does.
+fn pack(pixel: vec2i) {
+    let here = host_surface(pixel);
+    if here.id == 0u || here.id > view.profiles {
+        atomicOr(&marks, NOT_SKIN);
+        return;
+    }
+    let packed = packed_at(pixel, here);
+    let id = packed.shape.x >> 24u;
+    textureStore(packed_light, pixel, packed.light);
+    textureStore(packed_shape, pixel, vec4u(packed.shape, 0u, 0u));
+    if packed.bend > STEP {
         // Taps of the tiles beside this one reach it, too.
         let place = pixel & vec2i(i32(TILE) - 1);
         let beside = select(vec2i(0), vec2i(-1), place < vec2i(REACH)) + select(vec2i(0), vec2i(1), place >= vec2i(i32(TILE) - REACH));
         let tile = pixel / i32(TILE);
-        tell(tile + vec2i(beside.x, 0), brightness);
-        tell(tile + vec2i(0, beside.y), brightness);
+        tell(tile + vec2i(beside.x, 0), packed.brightness);
+        tell(tile + vec2i(0, beside.y), packed.brightness);
     }
-    atomicOr(&marks, (1u << coarsest_level(z, id)) | difficulty | (1u << (PROFILE_SHIFT + id - 1u)));
-    atomicMax(&brightest, bitcast<u32>(brightness));
-    atomicMax(&darkest, ~bitcast<u32>(brightness));
+    let level = coarsest_level(here.z, id);
+    atomicOr(&marks, (1u << level) | packed.difficulty | (1u << (PROFILE_SHIFT + id - 1u)));
+    atomicMax(&brightest, bitcast<u32>(packed.brightness));
+    atomicMax(&darkest, ~bitcast<u32>(packed.brightness));
 }
 
 @compute @workgroup_size(TILE, TILE)

@@ -29,7 +29,8 @@ struct View {
     level_limit: f32,
     // Levels above the frame.
     levels: u32,
-    pad: u32,
+    // How far behind the frame, in mm, a layer may lie to scatter to it; 0 where there is none.
+    back_reach: f32,
 }
 
 // A Gaussian, cut off by a shape of taps.

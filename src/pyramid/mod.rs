@@ -2,6 +2,7 @@
 //! and says what its tiles hold, another lists those of each level by their class; all others are drawn over
 //! these lists.
 
+mod back;
 mod passes;
 mod scratch;
 
@@ -13,7 +14,8 @@ use crate::frame::Viewport;
 use crate::gpu::{self, Recorder};
 use crate::optics::Optics;
 use crate::plan::Weights;
-use crate::{Error, Frame, Output};
+use crate::{Error, Frame, Output, Profile};
+use back::Back;
 pub(crate) use passes::OVERLAY;
 use passes::{LIGHT, OverTiles, Passes};
 use scratch::{CLASSES, DRAW_BYTES, Scratch};
@@ -42,6 +44,7 @@ pub(crate) struct Pyramid {
 #[derive(Debug)]
 pub(crate) struct PyramidView {
     scratch: Scratch,
+    back: Option<Back>,
     groups: Option<Groups>,
 }
 
@@ -52,6 +55,7 @@ struct Groups {
     read: Textures,
     viewport: Option<Viewport>,
     pack: BindGroup,
+    back: Option<back::Groups>,
     list_tiles: BindGroup,
     /// Of each level from 1 on.
     downsample: Vec<BindGroup>,
@@ -94,6 +98,7 @@ struct Textures {
     /// The irradiance where there is none; it is not looked at then.
     strength: TextureView,
     albedo: TextureView,
+    back: Option<back::Textures>,
 }
 
 impl Pyramid {
@@ -137,6 +142,11 @@ impl Pyramid {
         scratch::bytes(size, &self.plan)
     }
 
+    /// What a back layer takes on top.
+    pub(crate) fn back_scratch_bytes(&self, size: [u32; 2]) -> u64 {
+        scratch::back_bytes(size, &self.plan)
+    }
+
     /// Uploads the numbers of a frame. Makes anew what a change of its size, or of its textures, asks for.
     pub(crate) fn prepare(
         &self,
@@ -145,6 +155,7 @@ impl Pyramid {
         view: &mut Option<PyramidView>,
         frame: &Frame,
         optics: &Optics,
+        profiles: &[Profile],
     ) {
         let size = frame.rectangle().size();
         if view.as_ref().is_some_and(|v| v.scratch.size != size) {
@@ -152,8 +163,16 @@ impl Pyramid {
         }
         let view = view.get_or_insert_with(|| PyramidView {
             scratch: Scratch::new(device, queue, size, &self.plan),
+            back: None,
             groups: None,
         });
+        match frame.back {
+            Some(_) => drop(view.back.get_or_insert_with(|| Back::new(device, &view.scratch))),
+            None => view.back = None,
+        }
+        let gaussians = profiles.iter().flat_map(Profile::gaussians);
+        let widest_mm2 = gaussians.map(|g| g.variance_mm2).fold(0.0, f32::max);
+        let back_reach = back::REACH_SIGMAS * widest_mm2.sqrt();
         let plan = &self.plan;
         let numbers = scratch::View {
             has_id: u32::from(frame.profile_id.is_some()),
@@ -172,15 +191,22 @@ impl Pyramid {
             frame_limit: FRAME_LIMIT.min(FRAME_LIMIT_ERRORS * plan.predicted_error()),
             level_limit: LEVEL_LIMIT,
             levels: view.scratch.levels.len() as u32 - 1,
-            pad: 0,
+            back_reach: if frame.back.is_some() { back_reach } else { 0.0 },
         };
         queue.write_buffer(&view.scratch.view, 0, bytemuck::bytes_of(&numbers));
+        let back_id = frame.back.and_then(|back| back.profile_id).or(frame.profile_id);
+        if let Some(back) = &view.back {
+            back.upload(queue, &numbers, back_id.is_some());
+        }
         let read = Textures {
             irradiance: frame.irradiance.clone(),
             depth: frame.depth.clone(),
             profile_id: frame.profile_id.unwrap_or(&self.no_id).clone(),
             strength: frame.strength.unwrap_or(frame.irradiance).clone(),
             albedo: frame.albedo.unwrap_or(frame.irradiance).clone(),
+            back: frame.back.map(|back| {
+                [back.irradiance, back.depth, back_id.unwrap_or(&self.no_id)].map(TextureView::clone)
+            }),
         };
         match &mut view.groups {
             Some(groups) if groups.read == read && groups.weights == self.weights => {
@@ -188,7 +214,7 @@ impl Pyramid {
             }
             groups => {
                 view.scratch.set_plan(queue, plan);
-                *groups = Some(self.bind(device, &view.scratch, read, frame.viewport));
+                *groups = Some(self.bind(device, &view.scratch, view.back.as_ref(), read, frame.viewport));
             }
         }
     }
@@ -197,6 +223,7 @@ impl Pyramid {
         &self,
         device: &Device,
         scratch: &Scratch,
+        back: Option<&Back>,
         read: Textures,
         viewport: Option<Viewport>,
     ) -> Groups {
@@ -232,6 +259,9 @@ impl Pyramid {
                 resources.push((13, scratch.steps.as_entire_binding()));
                 resources.push((14, Texture(&scratch.lights)));
                 resources.push((15, Texture(&scratch.shapes)));
+                // Where there is no back these are not looked at.
+                resources.push((16, Texture(back.map_or(&scratch.lights, |back| &back.lights))));
+                resources.push((17, Texture(back.map_or(&scratch.shapes, |back| &back.shapes))));
             }
             group(&pass.layout, &resources)
         };
@@ -272,8 +302,13 @@ impl Pyramid {
                     (10, scratch.contents.as_entire_binding()),
                     (11, scratch.draws.as_entire_binding()),
                     (12, scratch.list.as_entire_binding()),
+                    (13, back.map_or(&scratch.contents, |back| &back.tiles).as_entire_binding()),
                 ],
             ),
+            back: back.zip(read.back.as_ref()).map(|(back, read)| {
+                let computes = [&passes.pack_back, &passes.halve_back];
+                back.bind(device, computes, scratch, &self.weights, read)
+            }),
             downsample: (1..levels.len()).map(downsample).collect(),
             level: (1..levels.len()).map(|l| blur(&passes.level, l)).collect(),
             frame: blur(&passes.frame, 0),
@@ -318,7 +353,7 @@ impl Pyramid {
 
     /// Records the frame that was last prepared.
     pub(crate) fn render(&self, recorder: &mut Recorder, view: &PyramidView, output: &TextureView) {
-        let PyramidView { scratch, groups } = view;
+        let PyramidView { scratch, groups, back } = view;
         let (Some(groups), [base, coarser @ ..]) = (groups, &scratch.levels[..]) else {
             return;
         };
@@ -327,6 +362,9 @@ impl Pyramid {
         let encoder = &mut *recorder.encoder;
         encoder.copy_buffer_to_buffer(&scratch.no_draws, 0, &scratch.draws, 0, draws);
         encoder.clear_buffer(&scratch.contents, 0, None);
+        if let Some(back) = back {
+            encoder.clear_buffer(&back.tiles, 0, None);
+        }
         // Nothing is drawn: it clears what is packed.
         recorder.draw("subsurface::pyramid clear", &[&base.light, &base.shape], false);
         {
@@ -335,14 +373,20 @@ impl Pyramid {
             pass.set_pipeline(&passes.pack.pipeline);
             pass.set_bind_group(0, &groups.pack, &[]);
             pass.dispatch_workgroups(x, y, 1);
+            if let Some(back) = &groups.back {
+                back.pack(&mut pass, &passes.pack_back, base.tiles);
+            }
             pass.set_pipeline(&passes.list_tiles.pipeline);
             pass.set_bind_group(0, &groups.list_tiles, &[]);
             pass.dispatch_workgroups(x.div_ceil(8), y.div_ceil(8), scratch.levels.len() as u32);
         }
+        if let Some(back) = &groups.back {
+            back.halve(recorder, &passes.halve_back, scratch);
+        }
         for ((group, level), l) in groups.downsample.iter().zip(coarser).zip(1..) {
             let label = format!("subsurface::pyramid downsample to level {l}");
             let mut pass = recorder.draw(&label, &[&level.light, &level.shape], false);
-            over_tiles(&mut pass, &passes.downsample, group, scratch, l);
+            over_tiles(&mut pass, &passes.downsample, group, scratch, l, false);
         }
         for l in (1..scratch.levels.len()).rev() {
             let (group, level) = (&groups.level[l - 1], &scratch.levels[l]);
@@ -350,7 +394,7 @@ impl Pyramid {
             let mut pass = recorder.draw(&label, &[scratch.mean(l)], false);
             let [x, y] = level.size.map(|s| s as f32);
             pass.set_viewport(0.0, 0.0, x, y, 0.0, 1.0);
-            over_tiles(&mut pass, &passes.level, group, scratch, l);
+            over_tiles(&mut pass, &passes.level, group, scratch, l, false);
         }
         let keeps = self.output.adds() || groups.viewport.is_some();
         let mut pass = recorder.draw("subsurface::pyramid blur frame", &[output], keeps);
@@ -363,7 +407,7 @@ impl Pyramid {
             let [x, y] = coarser.first().map_or([0, 0], |level| level.tiles);
             pass.draw(0..4, 0..x * y);
         }
-        over_tiles(&mut pass, &passes.frame, &groups.frame, scratch, 0);
+        over_tiles(&mut pass, &passes.frame, &groups.frame, scratch, 0, back.is_some());
     }
 }
 
@@ -374,10 +418,12 @@ fn over_tiles(
     group: &BindGroup,
     scratch: &Scratch,
     l: usize,
+    has_back: bool,
 ) {
     pass.set_bind_group(0, group, &[]);
     for (i, pipeline) in (CLASSES * l as u64..).zip(&draws.pipelines) {
-        pass.set_pipeline(pipeline);
+        let is_last = i + 1 == CLASSES * (l as u64 + 1);
+        pass.set_pipeline(draws.with_back.as_ref().filter(|_| is_last && has_back).unwrap_or(pipeline));
         pass.draw_indirect(&scratch.draws, i * DRAW_BYTES);
     }
 }

@@ -30,6 +30,8 @@ const DOWNSAMPLE: &[&str] = &[SURFACE, wgsl!("downsample")];
 pub(super) const PLANAR: &[&str] = &[SURFACE, BLUR, wgsl!("planar")];
 const GENERAL: &[&str] = &[SURFACE, BLUR, wgsl!("general")];
 pub(super) const DIRECT: &[&str] = &[SURFACE, BLUR, wgsl!("direct")];
+const PACK_BACK: &[&str] = &[SURFACE, HOST, wgsl!("pack"), wgsl!("pack_back")];
+const HALVE_BACK: &[&str] = &[SURFACE, wgsl!("downsample"), wgsl!("halve_back")];
 const COPY: &[&str] = &[SURFACE, TILES, wgsl!("copy")];
 /// Of [`Overlay`](crate::Overlay).
 pub(crate) const OVERLAY: &[&str] = &[SURFACE, HOST, TILES, wgsl!("overlay")];
@@ -45,6 +47,8 @@ pub(super) struct Compute {
 pub(super) struct OverTiles {
     pub layout: BindGroupLayout,
     pub pipelines: Vec<RenderPipeline>,
+    /// Of the last class where there is a back layer; of the frame alone.
+    pub with_back: Option<RenderPipeline>,
 }
 
 /// All passes.
@@ -52,6 +56,8 @@ pub(super) struct OverTiles {
 pub(super) struct Passes {
     pub pack: Compute,
     pub list_tiles: Compute,
+    pub pack_back: Compute,
+    pub halve_back: Compute,
     pub downsample: OverTiles,
     pub level: OverTiles,
     pub frame: OverTiles,
@@ -81,7 +87,7 @@ impl Passes {
                 _ => targets.iter().map(|t| Some((*t).into())).collect(),
             };
             let flag = |on| f64::from(u8::from(on));
-            let pipeline = |(class, (vertex, files)): (u32, &(&str, &[&str]))| {
+            let pipeline = |class: u32, (vertex, files): (&str, &[&str]), has_back: bool| {
                 let mut constants = vec![("CLASS", class.into())];
                 if let Some(kinds) = kinds {
                     constants.extend([
@@ -91,6 +97,9 @@ impl Passes {
                         ("FINEST", flag(entry == "fs_frame")),
                         ("DIFFERENCE", flag(output.is_difference())),
                     ]);
+                }
+                if has_back {
+                    constants.push(("BACK", 1.0));
                 }
                 let module: ShaderModule = gpu::module(device, &label, files);
                 gpu::Draw {
@@ -105,8 +114,11 @@ impl Passes {
                 }
                 .pipeline(device)
             };
-            let pipelines = (0..).zip(classes).map(pipeline).collect();
-            OverTiles { layout, pipelines }
+            let pipelines =
+                (0..).zip(classes).map(|(class, files)| pipeline(class, *files, false)).collect();
+            let last = (0..).zip(classes).last().filter(|_| entry == "fs_frame");
+            let with_back = last.map(|(class, files)| pipeline(class, *files, true));
+            OverTiles { layout, pipelines, with_back }
         };
         let level = [
             (0, UNIFORM),
@@ -121,7 +133,16 @@ impl Passes {
         ];
         let frame: Vec<_> = level
             .into_iter()
-            .chain([(4, FLOATS), (5, FLOATS), (6, FLOATS), (13, UNIFORM), (14, FLOATS), (15, UINTS)])
+            .chain([
+                (4, FLOATS),
+                (5, FLOATS),
+                (6, FLOATS),
+                (13, UNIFORM),
+                (14, FLOATS),
+                (15, UINTS),
+                (16, FLOATS),
+                (17, UINTS),
+            ])
             .collect();
         let copy_label = "subsurface::pyramid fs_copy";
         let copy_layout = gpu::layout(
@@ -150,7 +171,38 @@ impl Passes {
             list_tiles: compute(
                 "list_tiles",
                 LIST_TILES,
-                &[(0, UNIFORM), (9, UNIFORM), (10, READ), (11, WRITE), (12, WRITE)],
+                &[(0, UNIFORM), (9, UNIFORM), (10, READ), (11, WRITE), (12, WRITE), (13, READ)],
+            ),
+            pack_back: compute(
+                "pack_back",
+                PACK_BACK,
+                &[
+                    (0, UNIFORM),
+                    (1, UNIFORM),
+                    (3, READ),
+                    (4, FLOATS),
+                    (5, FLOATS),
+                    (6, UINTS),
+                    (7, gpu::stored(LIGHT)),
+                    (8, gpu::stored(SHAPE)),
+                    (9, UNIFORM),
+                    (11, UINTS),
+                    (12, WRITE),
+                ],
+            ),
+            halve_back: compute(
+                "halve_back",
+                HALVE_BACK,
+                &[
+                    (0, UNIFORM),
+                    (1, UNIFORM),
+                    (7, FLOATS),
+                    (8, UINTS),
+                    (9, UNIFORM),
+                    (12, READ),
+                    (13, gpu::stored(LIGHT)),
+                    (14, gpu::stored(SHAPE)),
+                ],
             ),
             downsample: over_tiles(
                 "fs_downsample",

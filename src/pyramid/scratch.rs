@@ -31,7 +31,7 @@ pub(super) struct View {
     pub frame_limit: f32,
     pub level_limit: f32,
     pub levels: u32,
-    pub pad: u32,
+    pub back_reach: f32,
 }
 
 /// `Blur` of surface.wgsl.
@@ -154,6 +154,43 @@ pub(super) fn bytes(size: [u32; 2], plan: &Weights) -> u64 {
     levels + means.iter().sum::<u64>()
 }
 
+/// What a back layer takes on top.
+pub(super) fn back_bytes(size: [u32; 2], plan: &Weights) -> u64 {
+    let of_level = |l| 16 * count(size_of_level(size, l)) + 4 * count(tiles_of_level(size, l));
+    (0..=level_count(size, plan)).map(of_level).sum()
+}
+
+/// A texture of so many levels, for a frame of this size.
+pub(super) fn mips(
+    device: &Device,
+    label: &str,
+    size: [u32; 2],
+    levels: usize,
+    format: wgpu::TextureFormat,
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    let [width, height] = padded(size);
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: levels as u32,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    })
+}
+
+/// One level of it.
+pub(super) fn mip(texture: &wgpu::Texture, l: usize) -> TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        base_mip_level: l as u32,
+        mip_level_count: Some(1),
+        ..Default::default()
+    })
+}
+
 impl Scratch {
     pub(super) fn new(device: &Device, queue: &Queue, size: [u32; 2], plan: &Weights) -> Self {
         let words = |label: &str, count: u32, usage| {
@@ -165,31 +202,12 @@ impl Scratch {
             })
         };
         let last = level_count(size, plan);
-        let mips = |label: &str, format, usage| {
-            let [width, height] = padded(size);
-            device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-                mip_level_count: 1 + last as u32,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage,
-                view_formats: &[],
-            })
-        };
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
             | wgpu::TextureUsages::TEXTURE_BINDING
             | wgpu::TextureUsages::STORAGE_BINDING;
-        let lights = mips("subsurface::pyramid light", LIGHT, usage);
-        let shapes = mips("subsurface::pyramid shape", SHAPE, usage);
-        let mip = |texture: &wgpu::Texture, l: usize| {
-            texture.create_view(&wgpu::TextureViewDescriptor {
-                base_mip_level: l as u32,
-                mip_level_count: Some(1),
-                ..Default::default()
-            })
-        };
+        let mips = |label, format| mips(device, label, size, 1 + last, format, usage);
+        let lights = mips("subsurface::pyramid light", LIGHT);
+        let shapes = mips("subsurface::pyramid shape", SHAPE);
         let mut first_tile = 0;
         let levels: Vec<_> = (0..=last)
             .map(|l| {
@@ -352,7 +370,7 @@ mod tests {
                 frame_limit,
                 level_limit,
                 levels,
-                pad
+                back_reach
             }
         );
         assert_layout!(&PLANAR.concat(), "Blur", Blur { variance, own, limit, narrow, sharpness, slot });

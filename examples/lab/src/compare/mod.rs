@@ -401,9 +401,6 @@ fn compare(options: &Options) -> Result<(), Error> {
         .map_err(|e| Error::new("--out", format!("\"{e}\""), "a directory that can be written to"))?;
     progress.finish_and_clear();
     println!("{}", report::table(&report));
-    for note in &report.notes {
-        println!("{note}");
-    }
     println!("{} in {:.1} s", options.out.join("report.html").display(), started.elapsed().as_secs_f64());
     Ok(())
 }

@@ -1,0 +1,44 @@
+// The layer behind the frame as the pyramid has it, where it is near enough to what is seen to scatter to it;
+// and in which tiles it is. A workgroup is a tile. Follows pack.wgsl, whose textures here are of the back.
+
+@group(0) @binding(11) var seen_shape: texture_2d<u32>;
+// Of the tiles of each level, as they are in `grids`.
+@group(0) @binding(12) var<storage, read_write> back_tiles: array<atomic<u32>>;
+
+// What a tile holds of the back: what scatters to pixels of the tile itself; anything.
+const BACK_NEAR = 1u;
+const BACK_ANY = 2u;
+
+var<workgroup> held: atomic<u32>;
+
+@compute @workgroup_size(TILE, TILE)
+fn pack_back(
+    @builtin(global_invocation_id) at: vec3u,
+    @builtin(workgroup_id) tile: vec3u,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    if all(at.xy < view.size) {
+        let pixel = vec2i(at.xy);
+        let seen = textureLoad(seen_shape, pixel, 0).rg;
+        let here = host_surface(pixel);
+        let is_skin = here.id != 0u && here.id <= view.profiles;
+        let thickness = bitcast<f32>(seen.y) - here.z;
+        // Twice as far as what scatters to this pixel may scatter to others.
+        if seen.x >> 24u != 0u && is_skin && thickness < 2.0 * view.back_reach {
+            let packed = packed_at(pixel, here);
+            textureStore(packed_light, pixel, packed.light);
+            textureStore(packed_shape, pixel, vec4u(packed.shape, 0u, 0u));
+            let is_near = thickness < view.back_reach && packed.shape.x >> 24u == seen.x >> 24u;
+            atomicOr(&held, select(BACK_ANY, BACK_ANY | BACK_NEAR, is_near));
+        } else {
+            textureStore(packed_light, pixel, vec4f(0.0));
+            textureStore(packed_shape, pixel, vec4u(0u));
+        }
+    }
+    workgroupBarrier();
+    if thread <= view.levels {
+        let grid = grids[thread];
+        let place = tile.xy >> vec2u(thread);
+        atomicOr(&back_tiles[grid.z + place.y * grid.x + place.x], atomicLoad(&held));
+    }
+}

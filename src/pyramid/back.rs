@@ -1,0 +1,136 @@
+//! The layer behind the frame, as the pyramid has it. Drives `shaders/pyramid/pack_back.wgsl` and
+//! `halve_back.wgsl`.
+
+use wgpu::{BindGroup, BindingResource, Buffer, BufferUsages, Device, Queue, TextureView};
+
+use super::passes::{Compute, LIGHT, SHAPE};
+use super::scratch::{self, Scratch, View};
+use crate::gpu::{self, Recorder};
+
+/// Three σ of a Gaussian: what lies further behind adds 1 % to its mass.
+pub(super) const REACH_SIGMAS: f32 = 3.0;
+
+/// What one view needs for it.
+#[derive(Debug)]
+pub(super) struct Back {
+    /// The numbers of the frame, as those of the back.
+    pub view: Buffer,
+    /// What each tile holds of it.
+    pub tiles: Buffer,
+    /// All levels of light, and of where the surface is.
+    pub lights: TextureView,
+    pub shapes: TextureView,
+    /// The same of each level.
+    levels: Vec<[TextureView; 2]>,
+}
+
+/// The groups of the last frame.
+#[derive(Debug)]
+pub(super) struct Groups {
+    pack: BindGroup,
+    /// Of each level from 1 on.
+    halve: Vec<BindGroup>,
+}
+
+/// Irradiance, depth and profile id.
+pub(super) type Textures = [TextureView; 3];
+
+impl Back {
+    pub(super) fn new(device: &Device, front: &Scratch) -> Self {
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::STORAGE_BINDING;
+        let count = front.levels.len();
+        let mips = |label, format| scratch::mips(device, label, front.size, count, format, usage);
+        let lights = mips("subsurface::pyramid light of the back", LIGHT);
+        let shapes = mips("subsurface::pyramid shape of the back", SHAPE);
+        Self {
+            view: gpu::uniform_buffer::<View>(device, "subsurface::pyramid view of the back"),
+            tiles: device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("subsurface::pyramid tiles of the back"),
+                size: 4 * front.levels.iter().map(|l| u64::from(l.tiles[0] * l.tiles[1])).sum::<u64>(),
+                usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }),
+            levels: (0..count)
+                .map(|l| [&lights, &shapes].map(|texture| scratch::mip(texture, l)))
+                .collect(),
+            lights: lights.create_view(&Default::default()),
+            shapes: shapes.create_view(&Default::default()),
+        }
+    }
+
+    /// Uploads the numbers of a frame; `has_id`: whether the back has ids.
+    pub(super) fn upload(&self, queue: &Queue, numbers: &View, has_id: bool) {
+        let numbers = View { has_id: has_id.into(), ..*numbers };
+        queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&numbers));
+    }
+
+    pub(super) fn bind(
+        &self,
+        device: &Device,
+        [pack, halve]: [&Compute; 2],
+        front: &Scratch,
+        weights: &Buffer,
+        [irradiance, depth, profile_id]: &Textures,
+    ) -> Groups {
+        use BindingResource::TextureView as Texture;
+        let label = "subsurface::pyramid back";
+        let [light, shape] = &self.levels[0];
+        let pack = gpu::group(
+            device,
+            label,
+            &pack.layout,
+            &[
+                (0, self.view.as_entire_binding()),
+                (1, front.levels[0].settings.as_entire_binding()),
+                (3, weights.as_entire_binding()),
+                (4, Texture(irradiance)),
+                (5, Texture(depth)),
+                (6, Texture(profile_id)),
+                (7, Texture(light)),
+                (8, Texture(shape)),
+                (9, front.grids.as_entire_binding()),
+                (11, Texture(&front.levels[0].shape)),
+                (12, self.tiles.as_entire_binding()),
+            ],
+        );
+        let pairs = self.levels.iter().zip(&self.levels[1..]).zip(&front.levels[1..]);
+        let halve = pairs.map(|(([light, shape], halved), level)| {
+            gpu::group(
+                device,
+                label,
+                &halve.layout,
+                &[
+                    (0, self.view.as_entire_binding()),
+                    (1, level.settings.as_entire_binding()),
+                    (7, Texture(light)),
+                    (8, Texture(shape)),
+                    (9, front.grids.as_entire_binding()),
+                    (12, self.tiles.as_entire_binding()),
+                    (13, Texture(&halved[0])),
+                    (14, Texture(&halved[1])),
+                ],
+            )
+        });
+        Groups { pack, halve: halve.collect() }
+    }
+}
+
+impl Groups {
+    /// Packs the tiles of the frame, after the frame itself was packed.
+    pub(super) fn pack(&self, pass: &mut wgpu::ComputePass, compute: &Compute, [x, y]: [u32; 2]) {
+        pass.set_pipeline(&compute.pipeline);
+        pass.set_bind_group(0, &self.pack, &[]);
+        pass.dispatch_workgroups(x, y, 1);
+    }
+
+    /// Makes all levels, in one pass.
+    pub(super) fn halve(&self, recorder: &mut Recorder, compute: &Compute, front: &Scratch) {
+        let mut pass = recorder.dispatch("subsurface::pyramid halve back");
+        pass.set_pipeline(&compute.pipeline);
+        for (group, level) in self.halve.iter().zip(&front.levels[1..]) {
+            let [x, y] = level.tiles;
+            pass.set_bind_group(0, group, &[]);
+            pass.dispatch_workgroups(x, y, 1);
+        }
+    }
+}
