@@ -58,6 +58,7 @@ impl Overlay {
             (6, gpu::UINTS),
             (9, gpu::UNIFORM),
             (10, gpu::READ),
+            (13, gpu::READ),
         ];
         let layout = gpu::layout(device, label, ShaderStages::FRAGMENT, &bindings);
         let pipeline = gpu::Draw {
@@ -101,6 +102,7 @@ impl Overlay {
             (6, BindingResource::TextureView(seen.profile_id)),
             (9, seen.grids.as_entire_binding()),
             (10, seen.contents.as_entire_binding()),
+            (13, seen.back_tiles.as_entire_binding()),
         ];
         let group = gpu::group(device, "subsurface::Overlay", &self.layout, &resources);
         let mut recorder = Recorder::new(encoder, None);

@@ -67,6 +67,9 @@ fn on_plane(variance_mm2: f32, in_space: f32, m: vec3f, own: f32) -> vec3f {
     return inverse - in_space * vec3f(m.x, 2.0 * m.y, m.z);
 }
 
+// What Gaussians weigh together that found light around the pixel.
+var<private> found: vec3f;
+
 // All Gaussians at a pixel whose surface is of this shape.
 fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
     let plane = plane_of(pixel, shape);
@@ -165,6 +168,7 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
             }
         }
         g.light += passed * select(e, sum.rgb / sum.a, sum.a > 1e-6);
+        found += select(vec3f(0.0), passed, sum.a > 1e-6);
     }
     // Levels that a small frame lacks: what the last one holds stands for them.
     let beyond = weight_at(scale, level.rest + view.levels);
@@ -172,6 +176,7 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
         let last = min(pixel >> vec2u(view.levels), vec2i(textureDimensions(lights, view.levels)) - 1);
         let there = textureLoad(lights, last, view.levels);
         g.light += beyond * select(e, there.rgb / there.a, there.a > 1e-6);
+        found += select(vec3f(0.0), beyond, there.a > 1e-6);
         g.weight += beyond;
     }
     return g;
@@ -185,6 +190,12 @@ fn fs_frame(@builtin(position) at: vec4f) -> @location(0) vec4f {
     if shape.id == 0u {
         discard;
     }
-    let e = light_of(textureLoad(here_light, pixel, 0));
-    return scattered(pixel, gathered(pixel, e, shape), e, share);
+    let here = textureLoad(here_light, pixel, 0);
+    let e = light_of(here);
+    var g = gathered(pixel, e, shape);
+    if here.a <= 0.0 {
+        // Light that is no number: the pixel has none of its own, and takes what was found around it.
+        g.light /= max(found, vec3f(1e-3));
+    }
+    return scattered(pixel, g, e, share);
 }

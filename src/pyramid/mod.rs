@@ -72,6 +72,8 @@ pub(crate) struct Seen<'a> {
     pub(crate) weights: &'a Buffer,
     pub(crate) grids: &'a Buffer,
     pub(crate) contents: &'a Buffer,
+    /// What the tiles hold of the layer behind; anything where there is none.
+    pub(crate) back_tiles: &'a Buffer,
     pub(crate) depth: &'a TextureView,
     pub(crate) profile_id: &'a TextureView,
 }
@@ -337,6 +339,7 @@ impl Pyramid {
             weights: &self.weights,
             grids: &view.scratch.grids,
             contents: &view.scratch.contents,
+            back_tiles: view.back.as_ref().map_or(&view.scratch.contents, |back| &back.tiles),
             depth: &groups.read.depth,
             profile_id: &groups.read.profile_id,
         })
