@@ -216,7 +216,12 @@ fn depths(side: u32) -> [Case; 5] {
         });
         // Infinity looks as NaN does, and -1 as 1.
         let looks_alike = value == f32::INFINITY || value == -1.0;
-        case.known(value.is_nan().then(|| known(ATLAS, f64::INFINITY, why))).pictured(!looks_alike)
+        let held = "A coarse pixel that holds the row right before the camera holds no face; planar tiles from three \
+            pixels beside it on take of it. Hand over depth without such rows, or use the exact sum.";
+        let is_close = value == 1.0 || value == -1.0;
+        case.known(value.is_nan().then(|| known(ATLAS, f64::INFINITY, why)))
+            .known(is_close.then(|| known(PLAN, 0.062, held)))
+            .pictured(!looks_alike)
     })
 }
 
@@ -261,8 +266,14 @@ fn stored_depths(side: u32) -> Vec<Case> {
         let why = "Each pixel is a surface of its own then, 2 mm from the next, and hardly any light crosses. \
             Hand over the depth of the mesh, from before noise or offsets of pixels are added to it.";
         let is_torn = name == "with noise of 2 mm";
-        let torn = [EXACT, PLAN].map(|method| by_nature(method, 0.04, why));
-        case.known(is_torn.then_some(torn).into_iter().flatten()).pictured(is_torn)
+        let torn = [by_nature(EXACT, 0.04, why), by_nature(PLAN, 0.058, why)];
+        let steps =
+            "Steps look like layers to the tiles that hold them. Use the exact sum, or finer depth.";
+        let at_most = [("in steps of 0.5 mm", 0.014), ("with noise of 0.1 mm", 0.0105)];
+        let at_most = at_most.into_iter().find(|(of, _)| *of == name);
+        case.known(is_torn.then_some(torn).into_iter().flatten())
+            .known(at_most.map(|(_, at_most)| known(PLAN, at_most, steps)))
+            .pictured(is_torn)
     };
     stored.map(case).into()
 }
