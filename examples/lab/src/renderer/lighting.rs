@@ -294,7 +294,9 @@ pub(super) struct Lights {
     pub layout: wgpu::BindGroupLayout,
     pub group: wgpu::BindGroup,
     uniform: wgpu::Buffer,
+    #[cfg_attr(not(feature = "programs"), expect(dead_code, reason = "programs alone set an environment"))]
     maps: wgpu::Texture,
+    #[cfg_attr(not(feature = "programs"), expect(dead_code, reason = "programs alone set an environment"))]
     sampler: wgpu::Sampler,
     pipeline: wgpu::RenderPipeline,
     shadows: [Shadow; Lighting::MAX_LIGHTS],
