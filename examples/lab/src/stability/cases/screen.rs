@@ -332,7 +332,7 @@ fn two_layers(quick: bool) -> Vec<Case> {
         slab(4.0).pictured(false),
         case("the rim of an ear", 128, [31, 16], || cylinder(0.75, 150.0))
             .known([planned(0.035), known(EXACT, 0.013, guess)]),
-        case("a finger", 128, [104, 40], || cylinder(8.0, 130.0)).known([planned(0.0255)]),
+        case("a finger", 128, [104, 40], || cylinder(8.0, 130.0)).known([planned(0.021)]),
         case("a head", 96, [88, half], || {
             Scene(vec![Surface::lit(ball(), from_camera(130.0, direction(27.0)))])
         })
