@@ -283,7 +283,7 @@ fn picture(measured: &[Measured], slope: f32) -> Result<RgbImage, Error> {
     let mut svg = Svg::default();
     svg.text([20.0, 34.0], "Models of surface reflection", TITLE);
     let about = format!(
-        "Flux f·cos θ·cos θ′ of skin's facets, m = {slope}, of light from 0° (blue), 30° (green) and 60° (red) on \
+        "Flux of skin's facets, f times both cosines, m = {slope}; light from 0° (blue), 30° (green) and 60° (red) on \
          the left; each lobe to its largest."
     );
     svg.text([20.0, 55.0], &about, Type::new(DIM, 13.0));
