@@ -63,7 +63,8 @@ pub struct Frame<'a> {
 /// one, or of a card, the back is another part or none.
 ///
 /// Textures are of the frame's size and projection, and follow [`Frame::viewport`]. Only what lies within 3.5 σ
-/// of the profile's widest Gaussian of visible skin counts, 9.5 mm for skin; elsewhere they may hold anything.
+/// of the profile's widest Gaussian of visible skin counts, 9.5 mm for skin (by a plan 3 σ, 8.2 mm); elsewhere they
+/// may hold anything.
 /// Each Gaussian is summed over both layers by distance in space and divided by its mass over both, so that even
 /// light stays even.
 #[derive(Clone, Copy, Debug)]

@@ -35,7 +35,7 @@ fn color(pixel: [f32; 4]) -> DVec3 {
 /// The largest difference of any channel over these pixels.
 fn worst(out: &[[f32; 4]], pixels: &[usize], truth: impl Fn(usize) -> DVec3) -> f64 {
     let differences = pixels.iter().map(|i| (color(out[*i]) - truth(*i)).abs().max_element());
-    differences.fold(0.0, f64::max)
+    largest(differences)
 }
 
 /// Pixels of skin.

@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "writes src/plan/skin.rs"]
+    #[ignore = "no check, but what writes src/plan/skin.rs, which stored_plans_are_what_is_fitted holds"]
     fn write_skin() {
         let mut text = format!(
             "//! Weights of skin, as they were fitted. Written by\n//!\n\

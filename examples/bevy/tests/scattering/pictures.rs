@@ -74,7 +74,7 @@ fn head(stage: &mut Stage) -> (Handle<Image>, Entity) {
 
 /// `cargo test -- --ignored pictures`
 #[test]
-#[ignore = "writes images/"]
+#[ignore = "no check, but what renders the README's pictures into images/"]
 fn pictures() {
     let mut stage = Stage::new(true);
     let (target, camera) = head(&mut stage);
