@@ -347,9 +347,8 @@ impl Solver {
         // (I − K)x = b.
         let mut matrix = kernel.matrix(scatters);
         let size = source.len();
-        for (i, k) in matrix.iter_mut().enumerate() {
-            *k = if i % (size + 1) == 0 { 1.0 - *k } else { -*k };
-        }
+        matrix.iter_mut().for_each(|k| *k = -*k);
+        matrix.iter_mut().step_by(size + 1).for_each(|k| *k += 1.0);
         let mut light = source.clone();
         solve_near_one(&mut matrix, &mut light);
         let emitted = kernel.emitted(scatters);
