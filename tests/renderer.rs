@@ -1,6 +1,7 @@
 //! The whole way from a head to both modes' layers, by the renderer that plays the host.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::path::Path;
 
 use glam::DVec3;
 use subsurface::wgpu::{TextureFormat, TextureView};
@@ -249,6 +250,51 @@ fn a_turning_environment_allocates_nothing() {
     let corner = here[0];
     assert!(corner[3] == 1.0 && corner[0] > 0.0, "{corner:?}");
     assert!(here != there && light != other);
+}
+
+#[test]
+fn a_file_lights_the_side_that_it_says() {
+    // Radiance's format, flat: a pixel of 64, the rest 1/8. The middle is what the camera looks at.
+    let [width, height] = [32, 16];
+    let file = |column: usize| {
+        let mut bytes =
+            format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes();
+        for i in 0..width * height {
+            let exponent = if i == (height / 2 - 1) * width + column { 135 } else { 126 };
+            bytes.extend([128, 128, 128, exponent]);
+        }
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("side-{column}.hdr"));
+        std::fs::write(&path, bytes).unwrap();
+        path
+    };
+    let scene = Scene::from_glb(subsurface_lab::HEAD).unwrap();
+    let mut renderer = Renderer::new(gpu(), &scene, SIZE).unwrap();
+    let camera = Camera::framing(&scene, View::Front, SIZE);
+    let mut sides = |column: usize| {
+        let environment = Environment::named(file(column).to_str().unwrap()).unwrap();
+        let mut lighting = Lighting::default();
+        renderer.set_environment(gpu(), &environment);
+        environment.light(&mut lighting, 0.0);
+        renderer.render(gpu(), &camera, &lighting, 1000.0).unwrap();
+        let g = &renderer.gbuffer;
+        let skin = gpu().read_bytes(g.profile_id.texture());
+        // Left and right, of light and of reflection.
+        [&g.irradiance, &g.specular].map(|light| {
+            let mut sums = [0.0f32; 2];
+            let pixels = gpu().read(light).into_iter().zip(&skin).enumerate();
+            for (i, (light, _)) in pixels.filter(|(_, (_, skin))| **skin == 1) {
+                sums[i % SIZE[0] as usize / (SIZE[0] as usize / 2)] += light[0];
+            }
+            sums
+        })
+    };
+    // +X is to the right of the head's picture.
+    for [left, right] in sides(3 * width / 4) {
+        assert!(right > 2.0 * left && left > 0.0, "left {left}, right {right}");
+    }
+    for [left, right] in sides(width / 4) {
+        assert!(left > 2.0 * right && right > 0.0, "left {left}, right {right}");
+    }
 }
 
 #[test]

@@ -29,6 +29,8 @@ const LIGHTS: usize = 2;
 /// What is brighter than so many times the mean is of a light, within this angle of its brightest pixel.
 const LIGHT_ABOVE: f32 = 8.0;
 const LIGHT_DEGREES: f32 = 12.0;
+/// What sums over a picture still hold in a float.
+const MOST_RADIANCE: f32 = 1e30;
 /// What a white surface that faces the brightest light reflects: faces are rendered about so bright.
 const BRIGHTEST: f32 = 1.1;
 
@@ -57,29 +59,40 @@ impl Environment {
     /// Reads an .hdr or .exr file, scaled to the light that faces are rendered in.
     ///
     /// # Errors
-    /// A file that cannot be read, or with light that is not finite or nowhere.
+    /// A file that cannot be read, is not of all directions, or has light that is not finite or nowhere.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        let input = path.display();
-        let bytes = std::fs::read(path)
-            .map_err(|e| Error::new(&input, format!("\"{e}\""), "an .hdr or .exr file that can be read"))?;
+        let bytes = std::fs::read(path).map_err(|e| {
+            Error::new(path.display(), format!("\"{e}\""), "an .hdr or .exr file that can be read")
+        })?;
+        Self::decode(&bytes).map_err(|e| e.within(path.display()))
+    }
+
+    fn decode(bytes: &[u8]) -> Result<Self, Error> {
         let refuse = |e: &dyn std::fmt::Display| {
-            let got = e.to_string().replace('\n', " ");
-            Error::new(&input, format!("\"{got}\""), "an .hdr or .exr picture of all directions")
+            Error::new("picture", format!("\"{e}\""), "a whole .hdr or .exr file, of red, green and blue")
         };
         let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| refuse(&e))?;
         let picture = reader.decode().map_err(|e| refuse(&e))?;
         if !matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_)) {
-            return Err(Error::new(&input, "a picture of eight or sixteen bits", "linear light in floats"));
+            let needs = "linear light in floats: .hdr or .exr";
+            return Err(Error::new("picture", "eight or sixteen bits a channel", needs));
+        }
+        let size @ [width, height] = [picture.width(), picture.height()];
+        // To a pixel, since rows and columns may be odd.
+        if width == 0 || height == 0 || u64::from(width).abs_diff(2 * u64::from(height)) > 1 {
+            let needs = "all directions, twice as many longitudes across as latitudes down";
+            return Err(Error::new("picture", format!("{width}x{height} pixels"), needs));
         }
         let picture = picture.into_rgb32f();
-        let size = [picture.width(), picture.height()];
         let pixels: Vec<Vec3> = picture.pixels().map(|p| Vec3::from(p.0)).collect();
-        if let Some(i) = pixels.iter().position(|p| !p.is_finite()) {
-            let got = format!("{} in column {}, row {}", pixels[i], i as u32 % size[0], i as u32 / size[0]);
-            return Err(Error::new(&input, got, "finite numbers"));
+        if let Some(i) =
+            pixels.iter().position(|p| !(p.abs().max_element() < MOST_RADIANCE && p.is_finite()))
+        {
+            let got = format!("{} in column {}, row {}", pixels[i], i as u32 % width, i as u32 / width);
+            return Err(Error::new("picture", got, format!("finite numbers below {MOST_RADIANCE:e}")));
         }
         Self::new(&shrunk(&pixels, size))
-            .ok_or_else(|| Error::new(&input, "no light", "a picture with light"))
+            .ok_or_else(|| Error::new("picture", "no light", "a pixel above 0"))
     }
 
     /// A studio by a formula: a warm window in front to the left, a cool one behind to the right, a ceiling and
@@ -108,7 +121,7 @@ impl Environment {
         let mut texels: Vec<Vec3> = texels.iter().map(|t| t.max(Vec3::ZERO)).collect();
         let mut lights = Vec::new();
         for _ in 0..LIGHTS {
-            lights.extend(take_light(&mut texels));
+            lights.extend(take_light(&mut texels, &lights));
         }
         let parts = directions().zip(&texels).map(|((d, solid_angle), t)| (d, *t, solid_angle));
         let mut sky = Sky::sum(parts);
@@ -180,23 +193,28 @@ impl Environment {
     }
 }
 
-/// Radiance from a direction, the nearest pixel's.
+/// Radiance from a direction, between the pixels around it, as the device's sampler has it.
 fn radiance(texels: &[Vec3], d: Vec3) -> Vec3 {
-    let [width, height] = SIZE;
-    let u = d.x.atan2(-d.z) / TAU + 0.5;
-    let v = d.y.clamp(-1.0, 1.0).acos() / PI;
-    let [x, y] = [(u, width), (v, height)].map(|(at, size)| ((at * size as f32) as u32).min(size - 1));
-    texels[(y * width + x) as usize]
+    let [width, height] = SIZE.map(|s| s as usize);
+    let x = (d.x.atan2(-d.z) / TAU + 0.5) * width as f32 + width as f32 - 0.5;
+    let y = (d.y.clamp(-1.0, 1.0).acos() / PI * height as f32 - 0.5).clamp(0.0, (height - 1) as f32);
+    let [left, top] = [x as usize % width, y as usize];
+    let row = |y: usize| {
+        let at = |x: usize| texels[y * width + x % width];
+        at(left).lerp(at(left + 1), x.fract())
+    };
+    row(top).lerp(row((top + 1).min(height - 1)), y.fract())
 }
 
 /// What facets of a slope reflect of a picture where they are seen in the direction of the mirror.
 fn blurred(texels: &[Vec3], slope: f32) -> Vec<Vec3> {
     let directions: Vec<Vec3> = directions().map(|(d, _)| d).collect();
-    // Half vectors by Beckmann's distribution.
+    // Half vectors by Beckmann's distribution, each to four sides, so that it does not show how they lie.
     let halves: Vec<Vec3> = (0..SAMPLES)
         .map(|i| {
-            let u = (i as f32 + 0.5) / SAMPLES as f32;
-            let phi = TAU * (i.reverse_bits() as f32 * 2f32.powi(-32));
+            let (i, side) = (i / 4, i % 4);
+            let u = (i as f32 + 0.5) / (SAMPLES / 4) as f32;
+            let phi = TAU / 4.0 * (side as f32 + i.reverse_bits() as f32 * 2f32.powi(-32));
             let tan = slope * (-(1.0 - u).ln()).sqrt();
             let cos = (1.0 + tan * tan).sqrt().recip();
             Vec3::new(tan * cos * phi.cos(), tan * cos * phi.sin(), cos)
@@ -251,15 +269,18 @@ fn luminance(light: Vec3) -> f32 {
     light.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
 
-/// Takes the brightest light out of a picture, if there is one that matters: one with a shadow of its own.
-fn take_light(texels: &mut [Vec3]) -> Option<Light> {
+/// Takes the brightest light out of a picture, if there is one that matters: one with a shadow of its own, and
+/// not what others have left of themselves.
+fn take_light(texels: &mut [Vec3], others: &[Light]) -> Option<Light> {
     let directions: Vec<(Vec3, f32)> = directions().collect();
     let mean =
         directions.iter().zip(&*texels).map(|((_, w), t)| w * luminance(*t)).sum::<f32>() / (4.0 * PI);
     let most = LIGHT_ABOVE * mean;
-    let brightest =
-        (0..texels.len()).max_by(|a, b| luminance(texels[*a]).total_cmp(&luminance(texels[*b])))?;
     let near = LIGHT_DEGREES.to_radians().cos();
+    let is_new = |i: &usize| others.iter().all(|other| directions[*i].0.dot(other.direction) < near);
+    let brightest = (0..texels.len())
+        .filter(is_new)
+        .max_by(|a, b| luminance(texels[*a]).total_cmp(&luminance(texels[*b])))?;
     // Around a direction: its power, where that comes from, and the picture without it.
     let take = |middle: Vec3| {
         let (mut power, mut towards) = (Vec3::ZERO, Vec3::ZERO);
@@ -294,7 +315,12 @@ fn take_light(texels: &mut [Vec3]) -> Option<Light> {
 
 #[cfg(test)]
 mod tests {
+    use image::{ImageFormat, Rgb, Rgb32FImage};
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
     use super::*;
+    use crate::damage::{Damage, config};
 
     /// Irradiance/π by all pixels, lights included.
     fn lit(environment: &Environment, n: Vec3) -> Vec3 {
@@ -367,6 +393,21 @@ mod tests {
     }
 
     #[test]
+    fn blurring_leaves_no_patches() {
+        // What is linear in the direction stays so, since all directions are blurred alike.
+        let linear: Vec<Vec3> = directions().map(|(d, _)| Vec3::new(d.x, d.y, d.z)).collect();
+        for slope in [0.05, 0.1, 0.4] {
+            let blurred = blurred(&linear, slope);
+            let along = directions().zip(&blurred).map(|((d, _), t)| d.dot(*t)).sum::<f32>();
+            let share = along / blurred.len() as f32;
+            let off = |((d, _), t): ((Vec3, f32), &Vec3)| (share * d - *t).abs().max_element();
+            let off = directions().zip(&blurred).map(off).fold(0.0, f32::max);
+            // At the poles, across which pixels are not interpolated; the nearest pixels would leave .0023.
+            assert!(off < 6e-4, "{slope}: {off}");
+        }
+    }
+
+    #[test]
     fn pictures_of_any_size_are_taken() {
         for size in [[1, 1], [3, 2], [1000, 700]] {
             let pixels = vec![Vec3::ONE; (size[0] * size[1]) as usize];
@@ -375,9 +416,108 @@ mod tests {
         assert!(Environment::new(&vec![Vec3::ZERO; (SIZE[0] * SIZE[1]) as usize]).is_none());
     }
 
+    fn picture(size: [u32; 2], pixel: impl Fn(u32, u32) -> f32) -> DynamicImage {
+        let pixel = |x, y| Rgb([1.0, 0.5, 0.25].map(|c| c * pixel(x, y)));
+        Rgb32FImage::from_fn(size[0], size[1], pixel).into()
+    }
+
+    fn encoded(picture: &DynamicImage, format: ImageFormat) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, format).unwrap();
+        bytes.into_inner()
+    }
+
+    /// As `compare --environment FILE` does it.
+    fn loaded(name: &str, bytes: &[u8]) -> Result<Environment, Error> {
+        let path = std::env::temp_dir().join(format!("environment-{}-{name}", std::process::id()));
+        std::fs::write(&path, bytes).unwrap();
+        let environment = Environment::named(path.to_str().unwrap());
+        std::fs::remove_file(&path).unwrap();
+        environment
+    }
+
+    #[test]
+    fn a_bright_pixel_of_a_file_lights_its_side() {
+        let size = [32, 16];
+        for [column, row] in [[24, 7], [7, 4], [0, 11], [16, 8]] {
+            let lamp = picture(size, |x, y| if [x, y] == [column, row] { 1000.0 } else { 1.0 });
+            // Longitudes from behind, by the left, the front (-Z) and the right; latitudes from the top.
+            let angle = |i: u32, of: u32| (i as f32 + 0.5) / of as f32;
+            let (east, down) = (TAU * (angle(column, size[0]) - 0.5), PI * angle(row, size[1]));
+            let towards = Vec3::new(east.sin() * down.sin(), down.cos(), -east.cos() * down.sin());
+            let half = 0.5 * PI / size[1] as f32;
+            let solid_angle = TAU / size[0] as f32 * 2.0 * down.sin() * half.sin();
+            for (name, format) in [("lamp.hdr", ImageFormat::Hdr), ("lamp.exr", ImageFormat::OpenExr)] {
+                let environment = loaded(name, &encoded(&lamp, format)).unwrap();
+                let [light] = environment.lights[..] else { panic!("{:?}", environment.lights) };
+                // A degree: the pixel is 11 wide, and away from the equator its middle is not its mean.
+                assert!(
+                    light.direction.dot(towards) > 1f32.to_radians().cos(),
+                    "{name}: {light:?} {towards}"
+                );
+                let [facing, away] = [towards, -towards].map(|n| lit(&environment, n));
+                let expected = 1.0 + 1000.0 * solid_angle / PI;
+                // What the lamp leaves in the sky lights the far side, too, by nine coefficients: 2 %. Eight bits: .4 %.
+                assert!(
+                    (facing.x / away.x / expected - 1.0).abs() < 0.03,
+                    "{} {expected}",
+                    facing.x / away.x
+                );
+                assert!((facing / facing.x - Vec3::new(1.0, 0.5, 0.25)).abs().max_element() < 0.005);
+                assert!((luminance(facing) / BRIGHTEST - 1.0).abs() < 0.01, "{facing}");
+            }
+        }
+    }
+
     #[test]
     fn files_that_are_no_pictures_of_light_are_named() {
-        let error = Environment::load(Path::new("no-such.hdr")).unwrap_err().to_string();
+        let grey = picture([8, 4], |_, _| 1.0);
+        let [hdr, exr] = [ImageFormat::Hdr, ImageFormat::OpenExr].map(|format| encoded(&grey, format));
+        let odd = |x: f32| {
+            let odd = picture([8, 4], |column, row| if [column, row] == [5, 2] { x } else { 1.0 });
+            encoded(&odd, ImageFormat::OpenExr)
+        };
+        let of = |size| encoded(&picture(size, |_, _| 1.0), ImageFormat::Hdr);
+        let empty = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 0 +X 0\n".to_vec();
+        let huge = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 60000 +X 120000\n".to_vec();
+        for (name, bytes, needs) in [
+            ("cut.hdr", hdr[..hdr.len() - 5].to_vec(), "a whole .hdr or .exr file"),
+            ("cut.exr", exr[..exr.len() - 5].to_vec(), "a whole .hdr or .exr file"),
+            ("nothing.hdr", vec![], "a whole .hdr or .exr file"),
+            ("words.exr", b"no picture".to_vec(), "a whole .hdr or .exr file"),
+            ("huge.hdr", huge, "a whole .hdr or .exr file"),
+            ("display.png", encoded(&grey.to_rgb8().into(), ImageFormat::Png), "linear light in floats"),
+            ("none.hdr", empty, "all directions"),
+            ("square.hdr", of([8, 8]), "all directions"),
+            ("strip.hdr", of([8, 1]), "all directions"),
+            ("nan.exr", odd(f32::NAN), "finite numbers"),
+            ("infinite.exr", odd(f32::INFINITY), "finite numbers"),
+            ("most.exr", odd(f32::MAX), "finite numbers"),
+            ("black.hdr", encoded(&picture([8, 4], |_, _| 0.0), ImageFormat::Hdr), "a pixel above 0"),
+            (
+                "negative.exr",
+                encoded(&picture([8, 4], |_, _| -1.0), ImageFormat::OpenExr),
+                "a pixel above 0",
+            ),
+        ] {
+            let error = loaded(name, &bytes).unwrap_err().to_string();
+            assert!(error.contains(name) && error.contains("got ") && error.contains(needs), "{error}");
+        }
+        let error = Environment::named("no-such.hdr").unwrap_err().to_string();
         assert!(error.starts_with("no-such.hdr: got"), "{error}");
+    }
+
+    proptest! {
+        #![proptest_config(config(300))]
+
+        #[test]
+        fn damaged_files_are_light_or_an_error(is_hdr: bool, damage in vec(any::<Damage>(), 1..4)) {
+            let format = if is_hdr { ImageFormat::Hdr } else { ImageFormat::OpenExr };
+            let mut bytes = encoded(&picture([8, 4], |x, y| (x * y) as f32), format);
+            damage.iter().for_each(|damage| damage.apply(&mut bytes));
+            if let Ok(environment) = Environment::decode(&bytes) {
+                prop_assert!(environment.texels.iter().all(|t| t.is_finite()));
+            }
+        }
     }
 }
