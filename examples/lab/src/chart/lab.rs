@@ -371,7 +371,7 @@ impl<'a> Lab<'a> {
             methods.push(turning::Method::Atlas(method.as_mut(), TURNING_2D));
         }
         let (gpu, mm) = (&self.gpu, self.options.mm_per_unit);
-        let (scene, fallen, turned) =
+        let (scene, none, turned) =
             turning::figure(gpu, &self.model, mm, &self.plan, &mut methods, || self.bar.inc(1))?;
         let mut done = Done::default();
         done.notes.push(
@@ -379,19 +379,22 @@ impl<'a> Lab<'a> {
                 .into(),
         );
         let copy_ms = turned.first().map_or(f64::NAN, |copy| copy.ms);
-        let none = turning::Turned { errors: fallen, ms: f64::NAN };
         let all = [("none", String::new(), &none)].into_iter();
         let all =
             all.chain(names.iter().zip(&turned).map(|((name, setting), t)| (*name, setting.clone(), t)));
         for (name, setting, turned) in all {
             let percent = |error: f64| format!("{:.2} %", 100.0 * error);
+            let [least, median, worst] = turned.spread().map(percent);
+            let rest = turned
+                .by_turning()
+                .map(|times| format!("; over the same light at rest at most {times:.4}"));
             done.notes.push(format!(
-                "turning: {}: {} in the first of {} frames, {} over all, {} in the worst.",
+                "turning: {}: {} in the first of {} frames, {least} to {worst}, median {median}, {} over all{}.",
                 format!("{name} {setting}").trim_end(),
                 percent(turned.errors[0]),
                 turned.errors.len(),
                 percent(turned.rms()),
-                percent(turned.worst()),
+                rest.unwrap_or_default(),
             ));
             if turned.ms.is_finite() {
                 let rel_rmse_visible = (name != "copy").then(|| turned.rms());

@@ -30,9 +30,12 @@ pub enum Method<'a> {
 }
 
 /// Of one method.
+#[derive(Default)]
 pub struct Turned {
-    /// Relative RMSE to the visible integral, by frame.
+    /// Relative RMSE to the visible integral of the frame's own light.
     pub errors: Vec<f64>,
+    /// The same once that light rests: of screen methods, which might keep something of frames before.
+    pub at_rest: Vec<f64>,
     /// Median.
     pub ms: f64,
 }
@@ -43,12 +46,20 @@ impl Turned {
         (self.errors.iter().map(|e| e * e).sum::<f64>() / self.errors.len() as f64).sqrt()
     }
 
-    pub fn worst(&self) -> f64 {
-        self.errors.iter().copied().fold(0.0, f64::max)
+    /// The least, the median and the worst.
+    pub fn spread(&self) -> [f64; 3] {
+        let errors = || self.errors.iter().copied();
+        [errors().fold(f64::INFINITY, f64::min), clock::median(&self.errors), errors().fold(0.0, f64::max)]
+    }
+
+    /// How many times as much as at rest a frame is off while the light turns, at most; none, of atlases.
+    pub fn by_turning(&self) -> Option<f64> {
+        let times = self.errors.iter().zip(&self.at_rest).map(|(turning, rest)| turning / rest);
+        times.reduce(f64::max)
     }
 }
 
-/// The scene as it was in the first frame, the errors of no scattering, and what became of each method.
+/// The scene as it was in the first frame, no scattering, and what became of each method.
 ///
 /// # Errors
 /// What the methods refuse; a model without skin in view.
@@ -59,7 +70,7 @@ pub fn figure(
     plan: &Plan,
     methods: &mut [Method],
     mut step: impl FnMut(),
-) -> Result<(Scene, Vec<f64>, Vec<Turned>), Error> {
+) -> Result<(Scene, Turned, Vec<Turned>), Error> {
     let size = plan.size.map(|s| s / 2);
     let camera = Camera::framing(model, View::Front, size);
     let mut scene = Scene::head(gpu, model, mm_per_unit, "turning", size, camera)?;
@@ -84,7 +95,7 @@ pub fn figure(
 
     let output = head.renderer.scattered_target(gpu);
     let mut fallen = Vec::new();
-    let mut errors = vec![Vec::new(); methods.len()];
+    let mut turned: Vec<_> = methods.iter().map(|_| Turned::default()).collect();
     let mut times = vec![Vec::new(); methods.len()];
     let mut atlases = Vec::new();
     for method in methods.iter() {
@@ -114,7 +125,7 @@ pub fn figure(
         };
         fallen.push(error(&light));
         for (i, method) in methods.iter_mut().enumerate() {
-            let ms = match (method, &atlases[i]) {
+            let ms = match (&mut *method, &atlases[i]) {
                 (Method::Screen(method), _) => {
                     let start = Instant::now();
                     method::scatter(gpu, &mut **method, &scene.frame(), &output)?;
@@ -125,14 +136,17 @@ pub fn figure(
                 }
                 _ => continue,
             };
-            errors[i].push(error(&read(gpu, &output)));
+            turned[i].errors.push(error(&read(gpu, &output)));
             times[i].push(ms);
+            if let Method::Screen(method) = method {
+                method::scatter(gpu, &mut **method, &scene.frame(), &output)?;
+                turned[i].at_rest.push(error(&read(gpu, &output)));
+            }
         }
         step();
     }
-    let turned =
-        errors.into_iter().zip(&times).map(|(errors, times)| Turned { errors, ms: clock::median(times) });
-    Ok((scene, fallen, turned.collect()))
+    turned.iter_mut().zip(times).for_each(|(turned, times)| turned.ms = clock::median(&times));
+    Ok((scene, Turned { errors: fallen, ms: f64::NAN, ..Turned::default() }, turned))
 }
 
 fn read(gpu: &Gpu, texture: &TextureView) -> Vec<Vec3> {
