@@ -17,6 +17,7 @@ mod separable;
 mod tests;
 mod texture_2d;
 mod texture_cascade;
+mod transmission;
 
 use crate::Error;
 use subsurface::Profile;
@@ -56,6 +57,20 @@ pub fn screen(device: &Device, format: TextureFormat, profile: &Profile) -> Resu
         methods.push(("burley_disk", samples.to_string(), Box::new(method)));
     }
     Ok(methods)
+}
+
+/// The separable kernel with light from behind, for frames that have a layer behind: as Jimenez et al. ship it, the
+/// same with the exponent that follows from the profile, and as Burley has it.
+pub fn transmission(device: &Device, format: TextureFormat, profile: &Profile) -> [Screen; 3] {
+    [
+        ("jimenez_2010", transmission::gaussians(profile, 1.0)),
+        ("jimenez_2010_derived", transmission::gaussians(profile, 2.0)),
+        ("burley_2015", transmission::burley(profile)),
+    ]
+    .map(|(name, transmittance)| -> Screen {
+        let method = transmission::Transmission::new(device, format, profile, &transmittance);
+        (name, String::new(), Box::new(method))
+    })
 }
 
 /// Every rival over an atlas, for outputs of `format`.

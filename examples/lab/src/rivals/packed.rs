@@ -92,11 +92,7 @@ impl Packed {
                 "ids alone: rivals know no more",
             ));
         };
-        let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-            label: Some("rivals frame"),
-            contents: bytemuck::bytes_of(&uniform(frame, profile_id)?),
-            usage: wgpu::BufferUsages::UNIFORM,
-        });
+        let uniform = uniform_buffer(device, frame, profile_id)?;
         let views = scratch(
             device,
             "rivals packed",
@@ -150,7 +146,20 @@ impl Packed {
     }
 }
 
-/// `frame` of the shaders. With clip z and w linear in view z, depth d = (P₂₂z + P₂₃)/(P₃₂z + P₃₃)
+/// `frame` of the shaders.
+pub fn uniform_buffer(
+    device: &Device,
+    frame: &Frame,
+    profile_id: &wgpu::TextureView,
+) -> Result<Buffer, Error> {
+    Ok(device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some("rivals frame"),
+        contents: bytemuck::bytes_of(&uniform(frame, profile_id)?),
+        usage: wgpu::BufferUsages::UNIFORM,
+    }))
+}
+
+/// With clip z and w linear in view z, depth d = (P₂₂z + P₂₃)/(P₃₂z + P₃₃)
 /// solves to z = (P₂₃ − d·P₃₃)/(d·P₃₂ − P₂₂), and a pixel is 2|w|/(W·P₀₀) wide.
 fn uniform(frame: &Frame, profile_id: &wgpu::TextureView) -> Result<[Vec4; 2], Error> {
     let p = glam::Mat4::from_cols_array_2d(&frame.projection);

@@ -9,7 +9,7 @@ use crate::Error;
 use crate::stability::lab::Lab;
 
 /// The methods, in the order of the table's columns.
-pub const METHODS: [&str; 9] = [
+pub const METHODS: [&str; 12] = [
     "none",
     EXACT,
     PLAN,
@@ -19,6 +19,9 @@ pub const METHODS: [&str; 9] = [
     "fitted_separable",
     "burley_disk",
     "texture_cascade",
+    "jimenez_2010",
+    "jimenez_2010_derived",
+    "burley_2015",
 ];
 /// Ours: the exact sum, a plan, and texture space.
 pub const EXACT: &str = "screen_exact";
@@ -29,8 +32,17 @@ pub const OURS: [&str; 3] = [EXACT, PLAN, ATLAS];
 pub const INPUT: &str = "input";
 
 /// What cases are about, in the order of the page.
-pub const GROUPS: [&str; 8] =
-    ["screen space", "ids and pixels", "texture space", "time", "numbers", "sizes", "hosts", "files"];
+pub const GROUPS: [&str; 9] = [
+    "screen space",
+    "light from behind",
+    "ids and pixels",
+    "texture space",
+    "time",
+    "numbers",
+    "sizes",
+    "hosts",
+    "files",
+];
 
 /// A figure for each method; methods that a case does not apply to are left out.
 pub type Figures = Vec<(&'static str, f64)>;

@@ -71,6 +71,8 @@ pub struct Lab {
     /// Of the skin profile, at the default error.
     pub plan: Plan,
     methods: RefCell<Methods>,
+    /// Those that need a layer behind the frame.
+    through: RefCell<Methods>,
     /// What the device complained of.
     complaints: Arc<Mutex<Vec<String>>>,
 }
@@ -88,7 +90,10 @@ impl Lab {
             }
         }));
         let plan = Plan::new(&[Profile::SKIN], DEFAULT_MAX_ERROR)?;
-        Ok(Self { methods: RefCell::new(methods(&gpu, &plan)?), gpu, plan, complaints })
+        let through = rivals::transmission(&gpu.device, OUTPUT, &Profile::SKIN).into_iter();
+        let through = through.map(|(name, _, method)| (name, Method::Screen(method))).collect();
+        let methods = methods(&gpu, &plan)?;
+        Ok(Self { methods: methods.into(), through: RefCell::new(through), gpu, plan, complaints })
     }
 
     /// What every method in screen space makes of a frame of skin; the first does nothing.
@@ -97,7 +102,9 @@ impl Lab {
     /// A frame that a method refuses.
     pub fn scatter(&self, frame: &Frame, output: &TextureView) -> Result<Results, Error> {
         let mut results = vec![("none", self.read(frame.irradiance))];
-        for (name, method) in self.methods.borrow_mut().iter_mut() {
+        let mut through = self.through.borrow_mut();
+        let through = through.iter_mut().filter(|_| frame.back.is_some());
+        for (name, method) in self.methods.borrow_mut().iter_mut().chain(through) {
             if let Method::Screen(method) = method {
                 method::scatter(&self.gpu, &mut **method, frame, output)?;
                 results.push((*name, self.read(output)));

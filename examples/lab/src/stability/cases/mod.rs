@@ -56,6 +56,7 @@ pub fn all(quick: bool) -> Vec<Case> {
         // First, while the process has had little memory: the readers are held to its peak.
         ("files", files::cases(quick)),
         ("screen space", screen::cases(quick)),
+        ("light from behind", screen::behind(quick)),
         ("ids and pixels", ids::cases(quick)),
         ("texture space", texture::cases(quick)),
         ("time", time::cases(quick)),

@@ -12,7 +12,7 @@ use crate::synthetic::{View, tilted_normal};
 use crate::truth::closed_form::through_slab;
 
 pub fn cases(quick: bool) -> Vec<Case> {
-    let groups = [layers, heads, silhouettes, border, slopes, behind, scales];
+    let groups = [layers, heads, silhouettes, border, slopes, scales];
     groups.iter().flat_map(|cases| cases(quick)).collect()
 }
 
@@ -225,7 +225,7 @@ fn slope([tilt, axis, edge]: [f64; 3], px_per_mm: f64) -> Trial {
 }
 
 /// Light that falls on what the camera does not see.
-fn behind(quick: bool) -> Vec<Case> {
+pub fn behind(quick: bool) -> Vec<Case> {
     let unseen = |[exact, plan]: [f64; 2]| -> [Known; 2] {
         let why = "The frame holds no light of what it does not show. Use texture space where \
             light comes around a rim, and add transmission by thickness where it comes through.";
@@ -284,8 +284,9 @@ fn behind(quick: bool) -> Vec<Case> {
 
 /// The same with the layer behind what the camera sees, which holds the light that is missing.
 fn two_layers(quick: bool) -> Vec<Case> {
-    let slab = |thickness_mm: f64| {
-        let [_, through] = through_slab(thickness_mm, &Profile::SKIN);
+    let slab = |thickness_mm: f64, is_printed: bool| {
+        let [printed, normalised] = through_slab(thickness_mm, &Profile::SKIN);
+        let through = if is_printed { printed } else { normalised };
         let make = move || {
             let view = View::orthographic([96; 2], 4.0);
             let face = || Form::facing(24.0);
@@ -295,9 +296,11 @@ fn two_layers(quick: bool) -> Vec<Case> {
             Trial::new(Scene(vec![near, far]), view, crop, Truth::Closed).with_back()
         };
         let what = "The same two faces with the hidden one handed in: difference to what Eq. 7 passes with each \
-            Gaussian divided by its mass on both faces.";
-        trial(format!("an ear {thickness_mm} mm thick, two layers"), what, GRADIENT, make)
+            Gaussian divided by its mass on both faces, or as printed.";
+        let printed = if is_printed { ", as printed" } else { "" };
+        trial(format!("an ear {thickness_mm} mm thick, two layers{printed}"), what, GRADIENT, make)
     };
+    let divided = "Each Gaussian is divided by its mass over both faces, so that even light stays even.";
     let case = |part: &str, size: u32, crop, scene: fn() -> Scene| {
         let make = move || {
             let view = View::orthographic([size; 2], 4.0);
@@ -327,9 +330,12 @@ fn two_layers(quick: bool) -> Vec<Case> {
     vec![
         front("the rim of an ear", 0.75, [32, 24]).known([planned(0.045), known(EXACT, 0.03, guess)]),
         front("a finger", 8.0, [96, 24]).known([planned(0.015)]),
-        slab(1.5),
-        slab(2.0).pictured(false),
-        slab(4.0).pictured(false),
+        slab(1.5, false),
+        slab(2.0, false).pictured(false),
+        slab(4.0, false).pictured(false),
+        slab(1.5, true)
+            .known([EXACT, PLAN].map(|method| by_nature(method, 0.115, divided)))
+            .pictured(false),
         case("the rim of an ear", 128, [31, 16], || cylinder(0.75, 150.0))
             .known([planned(0.035), known(EXACT, 0.013, guess)]),
         case("a finger", 128, [104, 40], || cylinder(8.0, 130.0)).known([planned(0.021)]),
