@@ -67,6 +67,8 @@ pub struct ModeReport {
     pub rel_rmse: Option<f64>,
     /// The same over the pixels where scattering changes the irradiance by more than .01.
     pub rel_rmse_scattered: Option<f64>,
+    /// As `rel_rmse`, to Eq. 7 over the whole mesh, where that is a mode.
+    pub rel_rmse_eq7: Option<f64>,
     /// Largest error of any channel of the irradiance, in linear light.
     pub max_error: Option<f64>,
     /// CIEDE2000 difference of irradiance times albedo that 99 % of the pixels stay within.
@@ -101,7 +103,7 @@ struct Figure {
     value: fn(&ModeReport) -> Option<f64>,
 }
 
-const FIGURES: [Figure; 9] = [
+const FIGURES: [Figure; 10] = [
     Figure {
         key: "ms",
         name: "Time",
@@ -156,6 +158,17 @@ const FIGURES: [Figure; 9] = [
         part: true,
         optional: false,
         value: |mode| mode.rel_rmse_scattered,
+    },
+    Figure {
+        key: "rel_rmse_vs_eq7",
+        name: "to Eq. 7",
+        unit: "%",
+        meaning: "The same distance from Eq. 7 over the whole mesh, each Gaussian divided by its mass.",
+        scale: 100.0,
+        decimals: 2,
+        part: true,
+        optional: true,
+        value: |mode| mode.rel_rmse_eq7,
     },
     Figure {
         key: "max_error_vs_texture",
@@ -585,6 +598,7 @@ mod tests {
             ms_blur: is_texture.then_some(10.0),
             rel_rmse: error,
             rel_rmse_scattered: error,
+            rel_rmse_eq7: None,
             max_error: error,
             delta_e2000_p99: error,
             flip_mean: error,
