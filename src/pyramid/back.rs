@@ -47,7 +47,7 @@ impl Back {
             tiles: device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("subsurface::pyramid tiles of the back"),
                 size: 4 * front.levels.iter().map(|l| u64::from(l.tiles[0] * l.tiles[1])).sum::<u64>(),
-                usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+                usage: BufferUsages::STORAGE | BufferUsages::COPY_DST | BufferUsages::COPY_SRC,
                 mapped_at_creation: false,
             }),
             levels: (0..count)

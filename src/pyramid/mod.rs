@@ -87,6 +87,8 @@ pub struct Tiles<'a> {
     /// Tiles, x in the low half of a word: of each level, the frame first, as many words as it has tiles, the
     /// planar ones from the front on, the others from the end. `COPY_SRC`.
     pub list: &'a Buffer,
+    /// A word a tile, levels in the same order: not 0 where there is a back layer within reach. `COPY_SRC`.
+    pub back: Option<&'a Buffer>,
     /// Columns and rows of tiles of each level.
     pub levels: Vec<[u32; 2]>,
 }
@@ -350,6 +352,7 @@ impl Pyramid {
         Tiles {
             draws: &scratch.draws,
             list: &scratch.list,
+            back: view.back.as_ref().map(|back| &back.tiles),
             levels: scratch.levels.iter().map(|level| level.tiles).collect(),
         }
     }

@@ -14,7 +14,7 @@ use crate::Error;
 use crate::method::{Ours, scatter};
 use crate::metrics::{self, Layer};
 use crate::output;
-use crate::renderer::{Camera, Gpu, Lighting, Renderer, Scene, View};
+use crate::renderer::{BackRenderer, Camera, Gpu, Lighting, Renderer, Scene, View};
 
 const SIZE: [u32; 2] = [512, 512];
 const MM_PER_UNIT: f32 = 1000.0;
@@ -45,10 +45,17 @@ fn run() -> Result<(), Error> {
          # view: its name, its skin pixels. The built-in head at 512x512. Written by\n\
          # cargo run --release --example uses\n",
     );
-    for (name, view) in [("front", View::Front), ("close-up", View::CloseUp)] {
+    let back = BackRenderer::new(&gpu, &renderer);
+    for (name, view, lighting) in [
+        ("front", View::Front, Lighting::default()),
+        ("close-up", View::CloseUp, Lighting::default()),
+        ("front, lit from behind", View::Front, Lighting::behind()),
+        ("ear, lit from behind", View::Ear, Lighting::behind()),
+    ] {
         let camera = Camera::framing(&scene, view, SIZE);
-        renderer.render(&gpu, &camera, &Lighting::default(), MM_PER_UNIT)?;
-        let seen = Seen::new(&gpu, &renderer, &camera)?;
+        renderer.render(&gpu, &camera, &lighting, MM_PER_UNIT)?;
+        back.render(&gpu, &renderer);
+        let seen = Seen::new(&gpu, &renderer, &camera, &back)?;
         text += &seen.uses(&gpu, name)?;
     }
     let folder = Path::new("examples/lab");
@@ -60,6 +67,7 @@ fn run() -> Result<(), Error> {
 struct Seen<'a> {
     renderer: &'a Renderer,
     frame: subsurface::Frame<'a>,
+    back: &'a BackRenderer,
     /// Columns of pixels: whether each is skin.
     is_skin: Vec<bool>,
     /// Points in mm, in view space.
@@ -72,7 +80,12 @@ struct Seen<'a> {
 }
 
 impl<'a> Seen<'a> {
-    fn new(gpu: &Gpu, renderer: &'a Renderer, camera: &Camera) -> Result<Self, Error> {
+    fn new(
+        gpu: &Gpu,
+        renderer: &'a Renderer,
+        camera: &Camera,
+        back: &'a BackRenderer,
+    ) -> Result<Self, Error> {
         let projection = camera.projection(SIZE);
         let frame = renderer.gbuffer.frame(projection, MM_PER_UNIT);
         let ids: Vec<u8> = gpu.read_bytes(renderer.gbuffer.profile_id.texture());
@@ -92,6 +105,7 @@ impl<'a> Seen<'a> {
         Ok(Self {
             renderer,
             frame,
+            back,
             copied,
             points: (0..).zip(depth).map(point).collect(),
             is_skin,
@@ -112,6 +126,10 @@ impl<'a> Seen<'a> {
             let counted = Counted::new(gpu, &ours)?;
             self.plan(&mut uses, &format!("plan {error}"), error, &plan, &counted, [on, off]);
             self.plan(&mut uses, &format!("plan {error}, in place"), error, &plan, &counted, [on, off]);
+            let mut frame = self.frame;
+            frame.back = Some(self.back.layer());
+            let counted = Counted::new(gpu, &scattered(gpu, self.renderer, &frame, &plan)?.0)?;
+            self.plan(&mut uses, &format!("plan {error}, two layers"), error, &plan, &counted, [on, off]);
         }
         uses.exact(on, off, self.px_per_mm());
         uses.rivals(on, off);
@@ -132,6 +150,16 @@ impl<'a> Seen<'a> {
             uses.add(method, "copy tiles", self.copied, 0, "", "");
         }
         uses.add(method, "pack", on, off / LEAVES_AT_ONCE, "guess", "");
+        let threads = |l: usize| counted.levels[l][0] * counted.levels[l][1] * TILE * TILE;
+        let direct_pass = match counted.back[..] {
+            [] => format!("frame direct {error}"),
+            _ => format!("frame direct, two layers {error}"),
+        };
+        for (l, tiles) in counted.back.iter().enumerate() {
+            let pass = if l == 0 { "pack back" } else { "halve back" };
+            let on = tiles * TILE * TILE;
+            uses.add(method, pass, on, threads(l) - on, "", "");
+        }
         let tiles: u32 = counted.levels.iter().map(|[x, y]| x * y).sum();
         let listed: u32 = counted.tiles.iter().flatten().sum();
         uses.add(method, "list", listed, tiles - listed, "guess", "");
@@ -140,11 +168,13 @@ impl<'a> Seen<'a> {
         // Tiles do not say whether the square is summed in them: a share of the planar pixels, as the rows say.
         let square = (f64::from(planar) * self.share_with_square(plan)) as u32;
         let trips = self.trips(plan, &counted.direct).map(|t| format!("{t:.2}")).join(" ");
-        for (kind, on, trips) in
-            [("planar", planar - square, ""), ("planar square", square, ""), ("direct", direct, &*trips)]
-        {
+        for (pass, on, trips) in [
+            (format!("frame planar {error}"), planar - square, ""),
+            (format!("frame planar square {error}"), square, ""),
+            (direct_pass, direct, &*trips),
+        ] {
             if on > 0 {
-                uses.add(method, &format!("frame {kind} {error}"), on, 0, "tiles", trips);
+                uses.add(method, &pass, on, 0, "tiles", trips);
             }
         }
         for level in 1..counted.levels.len() {
@@ -325,6 +355,8 @@ struct Counted {
     /// Columns and rows of tiles of each level.
     levels: Vec<[u32; 2]>,
     direct: Vec<[u32; 2]>,
+    /// Tiles of each level that have a back layer within reach; empty without one.
+    back: Vec<u32>,
 }
 
 impl Counted {
@@ -340,6 +372,13 @@ impl Counted {
         let direct = list[..(columns * rows) as usize].iter().rev().take(counts[0][1] as usize);
         Ok(Self {
             direct: direct.map(|word| [word & 0xffff, word >> 16]).collect(),
+            back: tiles.back.map_or(vec![], |back| {
+                let mut words = words(back).into_iter();
+                let has_back = |[x, y]: &[u32; 2]| {
+                    words.by_ref().take((x * y) as usize).filter(|w| *w != 0).count() as u32
+                };
+                tiles.levels.iter().map(has_back).collect()
+            }),
             tiles: counts,
             levels: tiles.levels,
         })
