@@ -7,7 +7,9 @@
 
 use glam::Mat4;
 use subsurface::wgpu::{CommandEncoder, Device, Queue, TextureFormat, TextureView};
-use subsurface::{Atlas, BackLayer, Error, Frame, Plan, Profile, ScreenSpace, TextureSpace, View};
+use subsurface::{
+    Atlas, AtlasView, BackLayer, Error, Frame, Plan, Profile, ScreenSpace, TextureSpace, View,
+};
 use subsurface_lab::renderer::Gpu;
 
 /// What the deferred renderer has by the time its diffuse light is done.
@@ -60,13 +62,14 @@ struct Unrolled {
 
 // The integration in texture space.
 struct SkinAtlas {
-    effect: TextureSpace,
+    effect: TextureSpace, // shared by all atlases
+    view: AtlasView,      // one for each atlas of a submission
 }
 
 impl SkinAtlas {
     fn new(device: &Device) -> Result<Self, Error> {
         let effect = TextureSpace::new(device, TextureFormat::Rgba16Float, &[Profile::SKIN])?;
-        Ok(Self { effect })
+        Ok(Self { effect, view: AtlasView::new() })
     }
 
     /// After the atlas is lit, before the head is drawn with what comes out.
@@ -83,8 +86,8 @@ impl SkinAtlas {
             positions: &unrolled.positions, // in metres, and 1 where there is skin
             mm_per_unit: 1000.0,
         };
-        self.effect.prepare(device, queue, &atlas)?;
-        self.effect.render(encoder, scattered)
+        self.view.prepare(device, queue, &self.effect, &atlas)?;
+        self.view.render(encoder, scattered)
     }
 }
 

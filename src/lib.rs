@@ -53,7 +53,7 @@ pub use profile::{Gaussian, Profile};
 #[doc(hidden)] // of use to the lab alone
 pub use pyramid::Tiles;
 pub use screen_space::{ScreenSpace, View};
-pub use texture_space::{Atlas, TextureSpace};
+pub use texture_space::{Atlas, AtlasView, TextureSpace};
 pub use wgpu;
 
 /// The most profiles that a frame can mix.

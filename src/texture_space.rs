@@ -1,5 +1,7 @@
 //! Scattering in texture space, the way of Li & Shao 2015: the reference path.
 
+use std::sync::Arc;
+
 use wgpu::{CommandEncoder, Device, QuerySet, Queue, TextureFormat, TextureView};
 
 use crate::exact::gaussian_sum::{GaussianSum, Inputs, Settings, Sums, Textures};
@@ -11,7 +13,7 @@ use crate::{Error, Output, Profile};
 /// a seam finds skin on both sides.
 const GUTTER: i32 = 4;
 
-/// One surface unrolled into its UV space, as [`TextureSpace::prepare`] takes it.
+/// One surface unrolled into its UV space, as [`AtlasView::prepare`] takes it.
 ///
 /// A surface that shares its UVs with another, or with itself, needs an atlas for each: a texel has room
 /// for one point. All textures are two-dimensional, single-sampled, of one size, and have the usage
@@ -32,15 +34,20 @@ pub struct Atlas<'a> {
 /// Scattering over an atlas (Li & Shao 2015, Eq. 7 to 12): each Gaussian in two passes along u and the
 /// sheared v, by the distances between the texels' points, which corrects stretch and shear of the UVs.
 ///
-/// Each frame and atlas, the host draws its mesh into the atlas with [`VERTEX_WGSL`](Self::VERTEX_WGSL),
-/// [`prepare`](Self::prepare) checks and uploads, [`render`](Self::render) records, and the final pass
-/// samples the output by the mesh's UVs. Scratch memory: 64 bytes a texel.
-#[derive(Debug)]
+/// As a [`ScreenSpace`](crate::ScreenSpace) it holds all pipelines: make it where you load. A clone shares
+/// them, and one effect serves any number of [`AtlasView`]s. Each frame and atlas, the host draws its mesh into
+/// the atlas with [`VERTEX_WGSL`](Self::VERTEX_WGSL), a view scatters it, and the final pass samples the output
+/// by the mesh's UVs.
+#[derive(Clone, Debug)]
 pub struct TextureSpace {
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug)]
+struct Shared {
     output: Output,
     profiles: Vec<Profile>,
     sum: GaussianSum,
-    sums: Option<Sums>,
 }
 
 impl TextureSpace {
@@ -58,12 +65,24 @@ impl TextureSpace {
         let output = Output::Scattered(output_format);
         validate::output(device, output)?;
         validate::profiles(profiles)?;
-        Ok(Self {
-            output,
-            profiles: profiles.to_vec(),
-            sum: GaussianSum::new(device, output, "subsurface::TextureSpace", false),
-            sums: None,
-        })
+        let sum = GaussianSum::new(device, output, "subsurface::TextureSpace", false);
+        Ok(Self { shared: Arc::new(Shared { output, profiles: profiles.to_vec(), sum }) })
+    }
+}
+
+/// What one atlas of a submission needs: scratch textures, 64 bytes a texel, and the numbers of its last frame.
+///
+/// [`prepare`](Self::prepare) checks and uploads, [`render`](Self::render) records, as a [`View`](crate::View)
+/// does. Several atlases may take turns in one view if each is submitted before the next is prepared.
+#[derive(Debug, Default)]
+pub struct AtlasView {
+    prepared: Option<(TextureSpace, Sums)>,
+}
+
+impl AtlasView {
+    /// A view that was not prepared yet. It takes no memory on the device.
+    pub fn new() -> Self {
+        Self::default()
     }
 
     /// Checks an atlas and uploads what the shaders need. Scratch textures are made anew when its size
@@ -71,16 +90,22 @@ impl TextureSpace {
     ///
     /// # Errors
     /// The first input that does not fit; the atlas prepared before stays in place.
-    pub fn prepare(&mut self, device: &Device, queue: &Queue, atlas: &Atlas) -> Result<(), Error> {
+    pub fn prepare(
+        &mut self,
+        device: &Device,
+        queue: &Queue,
+        effect: &TextureSpace,
+        atlas: &Atlas,
+    ) -> Result<(), Error> {
         let texture = atlas.irradiance.texture();
         let size = [texture.width(), texture.height()];
         validate::texture("irradiance", atlas.irradiance, Role::Color, size)?;
         validate::texture("positions", atlas.positions, Role::Positions, size)?;
         validate::mm_per_unit(atlas.mm_per_unit)?;
-        if self.sums.as_ref().is_some_and(|s| s.size() != size) {
-            self.sums = None; // The old scratch goes before the new one comes.
-        }
-        let sums = self.sums.get_or_insert_with(|| self.sum.sums(device, size));
+        let Shared { profiles, sum, .. } = &*effect.shared;
+        // Scratch of another size goes before the new one comes.
+        let kept = self.prepared.take().map(|(_, sums)| sums).filter(|sums| sums.size() == size);
+        let mut sums = kept.unwrap_or_else(|| sum.sums(device, size));
         let textures = Textures {
             positions: atlas.positions.clone(),
             irradiance: atlas.irradiance.clone(),
@@ -88,14 +113,14 @@ impl TextureSpace {
             albedo: atlas.irradiance.clone(),
             back: None,
         };
-        let settings = Settings { gutter: GUTTER, ..Settings::new(&self.profiles, atlas.mm_per_unit) };
-        let inputs = Inputs::new(&self.profiles, textures, settings, None);
-        self.sum.prepare(device, queue, sums, inputs);
+        let settings = Settings { gutter: GUTTER, ..Settings::new(profiles, atlas.mm_per_unit) };
+        sum.prepare(device, queue, &mut sums, Inputs::new(profiles, textures, settings, None));
+        self.prepared = Some((effect.clone(), sums));
         Ok(())
     }
 
-    /// Records the atlas that was last prepared. The result goes to `output`, of the format that
-    /// [`new`](Self::new) was told and of the atlas's size; islands are dilated by 4 texels.
+    /// Records the atlas that was last prepared. The result goes to `output`, of the format that the effect
+    /// was made for and of the atlas's size; islands are dilated by 4 texels.
     ///
     /// # Errors
     /// An output that does not fit; a call before the first [`prepare`](Self::prepare).
@@ -124,12 +149,13 @@ impl TextureSpace {
         output: &TextureView,
         times: Option<(&QuerySet, u32)>,
     ) -> Result<Vec<String>, Error> {
-        let (sums, read) =
-            self.sums.as_ref().and_then(|sums| Some((sums, sums.read()?))).ok_or(Error::NotPrepared)?;
-        let inputs = [("irradiance", &read.irradiance), ("positions", &read.positions)];
-        validate::target(output, self.output, sums.size(), inputs.into_iter())?;
+        let (effect, sums) = self.prepared.as_ref().ok_or(Error::NotPrepared)?;
+        let Shared { output: format, sum, .. } = &*effect.shared;
+        let read = sums.read().into_iter();
+        let inputs = read.flat_map(|t| [("irradiance", &t.irradiance), ("positions", &t.positions)]);
+        validate::target(output, *format, sums.size(), inputs)?;
         let mut recorder = Recorder::new(encoder, times);
-        self.sum.render(&mut recorder, sums, output);
+        sum.render(&mut recorder, sums, output);
         Ok(recorder.finish())
     }
 }

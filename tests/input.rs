@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use glam::Mat4;
 use subsurface::wgpu::{self, TextureFormat, TextureUsages, TextureView};
 use subsurface::{
-    Atlas, BackLayer, Error, Frame, Output, Plan, Profile, ScreenSpace, TextureSpace, Viewport,
+    Atlas, AtlasView, BackLayer, Error, Frame, Output, Plan, Profile, ScreenSpace, TextureSpace, Viewport,
 };
 use subsurface_lab::synthetic::{View, gpu};
 
@@ -304,18 +304,19 @@ fn a_frame_that_was_refused_leaves_the_one_before() {
 #[test]
 fn the_atlas_is_checked_too() {
     let gpu = gpu();
-    let mut path = TextureSpace::new(&gpu.device, HALF, &[Profile::SKIN]).unwrap();
+    let effect = TextureSpace::new(&gpu.device, HALF, &[Profile::SKIN]).unwrap();
+    let mut atlas_view = AtlasView::new();
     let irradiance = view(HALF);
     let mut prepare = |positions: &TextureView, mm_per_unit: f32| {
         let atlas = Atlas { irradiance: &irradiance, positions, mm_per_unit };
-        path.prepare(&gpu.device, &gpu.queue, &atlas)
+        atlas_view.prepare(&gpu.device, &gpu.queue, &effect, &atlas)
     };
     let positions = view(TextureFormat::Rgba32Float);
     prepare(&positions, 1000.0).unwrap();
     let error = prepare(&view(TextureFormat::R8Uint), 1000.0).unwrap_err();
     assert_names(&error, "positions: format");
     assert_names(&prepare(&positions, 0.0).unwrap_err(), "mm_per_unit");
-    let render = |output: &TextureView| gpu.run(|encoder| path.render(encoder, output));
+    let render = |output: &TextureView| gpu.run(|encoder| atlas_view.render(encoder, output));
     assert_names(&render(&irradiance).unwrap_err(), "output");
     render(&view(HALF)).unwrap();
 }
@@ -324,9 +325,8 @@ fn the_atlas_is_checked_too() {
 fn nothing_is_drawn_before_the_first_frame() {
     let gpu = gpu();
     let output = view(HALF);
-    let texture = TextureSpace::new(&gpu.device, HALF, &[Profile::SKIN]).unwrap();
     let results = gpu.run(|encoder| {
-        [subsurface::View::new().render(encoder, &output), texture.render(encoder, &output)]
+        [subsurface::View::new().render(encoder, &output), AtlasView::new().render(encoder, &output)]
     });
     assert_eq!(results, [Err(Error::NotPrepared), Err(Error::NotPrepared)]);
 }

@@ -5,12 +5,15 @@ use std::path::Path;
 
 use glam::DVec3;
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Plan, Profile, TextureSpace};
+use subsurface::{Plan, Profile};
 use subsurface_lab::renderer::{
     AtlasRenderer, BrdfTables, Camera, Environment, Gpu, Layer, Lighting, Renderer, Scene, Specular, View,
 };
 use subsurface_lab::synthetic::{gpu, ours};
-use subsurface_lab::{Error, method};
+use subsurface_lab::{
+    Error,
+    method::{self, OursUnrolled},
+};
 const SIZE: [u32; 2] = [256, 256];
 
 struct Head {
@@ -37,7 +40,7 @@ fn screen_space(head: &Head) -> TextureView {
 /// Texture space, into `output`.
 fn scatter_texture(head: &Head, size: u32, output: &TextureView) -> Result<(), Error> {
     let format = output.texture().format();
-    let mut effect = TextureSpace::new(&gpu().device, format, &[Profile::SKIN])?;
+    let mut effect = OursUnrolled::new(&gpu().device, format, &[Profile::SKIN])?;
     let atlas = AtlasRenderer::new(gpu(), &head.renderer, size)?;
     atlas.render(gpu(), &head.renderer, 1, 1000.0, output, |atlas, output| {
         method::scatter_atlas(gpu(), &mut effect, atlas, output)

@@ -1,18 +1,19 @@
 //! The texture-space path against closed forms.
 
 use glam::{DVec2, DVec3};
-use subsurface::wgpu::TextureFormat;
-use subsurface::{Atlas, Profile, TextureSpace};
-use subsurface_lab::method;
+use subsurface::wgpu::{TextureFormat, TextureView};
+use subsurface::{Atlas, AtlasView, Profile, TextureSpace};
+use subsurface_lab::method::{self, OursUnrolled};
 use subsurface_lab::synthetic::*;
 use subsurface_lab::truth::closed_form::{scattered_cosine, scattered_step, step};
+
+const FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 
 /// Position in mm and irradiance of a texel; `None` off the islands.
 type Texel = Option<(DVec3, DVec3)>;
 
-/// The path over an atlas of this many texels a side; `texel` takes the texel's centre.
-fn scatter(size: u32, profile: &Profile, texel: impl Fn(DVec2) -> Texel) -> Vec<DVec3> {
-    let gpu = gpu();
+/// Irradiance and positions, in metres, of an atlas of this many texels a side; `texel` takes the texel's centre.
+fn textures(size: u32, texel: impl Fn(DVec2) -> Texel) -> [TextureView; 2] {
     let (mut irradiance, mut positions) = (Vec::new(), Vec::new());
     for y in 0..size {
         for x in 0..size {
@@ -24,14 +25,17 @@ fn scatter(size: u32, profile: &Profile, texel: impl Fn(DVec2) -> Texel) -> Vec<
             positions.push((p * 1e-3).as_vec3().extend(id).to_array());
         }
     }
-    let format = TextureFormat::Rgba32Float;
-    let output = gpu.target("output", [size; 2], format);
-    let mut path = TextureSpace::new(&gpu.device, format, &[*profile]).unwrap();
-    let atlas = Atlas {
-        irradiance: &gpu.upload("irradiance", [size; 2], format, &irradiance),
-        positions: &gpu.upload("positions", [size; 2], format, &positions),
-        mm_per_unit: 1000.0,
-    };
+    [("irradiance", irradiance), ("positions", positions)]
+        .map(|(name, texels)| gpu().upload(name, [size; 2], FORMAT, &texels))
+}
+
+/// The path over such an atlas.
+fn scatter(size: u32, profile: &Profile, texel: impl Fn(DVec2) -> Texel) -> Vec<DVec3> {
+    let gpu = gpu();
+    let [irradiance, positions] = &textures(size, texel);
+    let output = gpu.target("output", [size; 2], FORMAT);
+    let mut path = OursUnrolled::new(&gpu.device, FORMAT, &[*profile]).unwrap();
+    let atlas = Atlas { irradiance, positions, mm_per_unit: 1000.0 };
     method::scatter_atlas(gpu, &mut path, &atlas, &output).unwrap();
     gpu.read(&output).iter().map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into())).collect()
 }
@@ -125,6 +129,36 @@ fn a_sphere_matches_eq_7() {
     // .0009 measured: unlike on the screen nothing is hidden, and what is left is the two passes on
     // a bent surface.
     assert!(red <= 0.0015, "{red}");
+}
+
+/// One effect, a view each: what the second prepares leaves the first as it is.
+#[test]
+fn two_atlases_share_a_submission() {
+    let gpu = gpu();
+    let lit = |t: DVec2| DVec3::splat(f64::from(u8::from(t.x > 16.0)));
+    let [irradiance, positions] = &textures(32, |t| Some((t.extend(0.0), lit(t))));
+    let effect = TextureSpace::new(&gpu.device, FORMAT, &[Profile::SKIN]).unwrap();
+    let scales = [1000.0, 200.0];
+    let outputs = scales.map(|_| gpu.target("output", [32; 2], FORMAT));
+    let together = {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let mut views = scales.map(|_| AtlasView::new());
+        for ((view, output), mm_per_unit) in views.iter_mut().zip(&outputs).zip(scales) {
+            let atlas = Atlas { irradiance, positions, mm_per_unit };
+            view.prepare(&gpu.device, &gpu.queue, &effect, &atlas).unwrap();
+            view.render(&mut encoder, output).unwrap();
+        }
+        gpu.queue.submit([encoder.finish()]);
+        outputs.each_ref().map(|output| gpu.read(output))
+    };
+    // In turn, by one view.
+    let mut alone = OursUnrolled { effect, view: AtlasView::new() };
+    for ((output, expected), mm_per_unit) in outputs.iter().zip(&together).zip(scales) {
+        let atlas = Atlas { irradiance, positions, mm_per_unit };
+        method::scatter_atlas(gpu, &mut alone, &atlas, output).unwrap();
+        assert_eq!(gpu.read(output), *expected, "{mm_per_unit}");
+    }
+    assert_ne!(together[0], together[1]);
 }
 
 #[test]

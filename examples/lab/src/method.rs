@@ -2,7 +2,7 @@
 //! what a host gets back.
 
 use subsurface::wgpu::{CommandEncoder, Device, Queue, TextureFormat, TextureView};
-use subsurface::{Atlas, Frame, Plan, Profile, ScreenSpace, TextureSpace, View};
+use subsurface::{Atlas, AtlasView, Frame, Plan, Profile, ScreenSpace, TextureSpace, View};
 
 use crate::Error;
 use crate::renderer::Gpu;
@@ -109,13 +109,27 @@ fn exact_fetches(px_per_mm: f64) -> f64 {
     fetches
 }
 
-impl AtlasMethod for TextureSpace {
+/// This crate's effect over an atlas, of one view.
+pub struct OursUnrolled {
+    pub effect: TextureSpace,
+    pub view: AtlasView,
+}
+
+impl OursUnrolled {
+    /// # Errors
+    /// A format that the effect refuses.
+    pub fn new(device: &Device, output: TextureFormat, profiles: &[Profile]) -> Result<Self, Error> {
+        Ok(Self { effect: TextureSpace::new(device, output, profiles)?, view: AtlasView::new() })
+    }
+}
+
+impl AtlasMethod for OursUnrolled {
     fn prepare(&mut self, device: &Device, queue: &Queue, atlas: &Atlas) -> Result<(), Error> {
-        Ok(self.prepare(device, queue, atlas)?)
+        Ok(self.view.prepare(device, queue, &self.effect, atlas)?)
     }
 
     fn render(&self, encoder: &mut CommandEncoder, output: &TextureView) -> Result<(), Error> {
-        Ok(self.render(encoder, output)?)
+        Ok(self.view.render(encoder, output)?)
     }
 
     fn scratch_bytes_per_texel(&self) -> f64 {

@@ -10,9 +10,9 @@ use std::time::Instant;
 
 use image::RgbImage;
 use subsurface::wgpu::TextureView;
-use subsurface::{Atlas, Plan, Profile, ScreenSpace, TextureSpace};
+use subsurface::{Atlas, Plan, Profile, ScreenSpace};
 use subsurface_lab::Error;
-use subsurface_lab::method::Ours;
+use subsurface_lab::method::{Ours, OursUnrolled};
 use subsurface_lab::metrics;
 use subsurface_lab::renderer::{
     AtlasRenderer, BackRenderer, Camera, Environment, Gpu, Layer as Shown, Lighting, Renderer, Scene,
@@ -168,7 +168,7 @@ struct Effects {
     /// None where the device has none.
     timestamps: Option<Timestamps>,
     screen: HashMap<Layer, Ours>,
-    texture: Option<(Profile, TextureSpace)>,
+    texture: Option<(Profile, OursUnrolled)>,
     /// What each took last.
     last_ms: HashMap<Layer, f64>,
 }
@@ -418,18 +418,18 @@ impl Set {
                 title = format!("{title}, {0}×{0}", stage.texture_size);
                 let effect = match effects.texture.take() {
                     Some((profile, effect)) if profile == look.profile => effect,
-                    _ => TextureSpace::new(&gpu.device, format, &[look.profile])?,
+                    _ => OursUnrolled::new(&gpu.device, format, &[look.profile])?,
                 };
-                let (_, effect) = effects.texture.insert((look.profile, effect));
+                let (_, OursUnrolled { effect, view }) = effects.texture.insert((look.profile, effect));
                 if self.atlas.is_none() {
                     self.atlas = Some(AtlasRenderer::new(gpu, renderer, stage.texture_size)?);
                 }
                 let scatter = |atlas: &Atlas, to: &TextureView| {
-                    effect.prepare(&gpu.device, &gpu.queue, atlas)?;
+                    view.prepare(&gpu.device, &gpu.queue, effect, atlas)?;
                     let times = effects.timestamps.as_ref().zip(passes.as_deref_mut());
                     passes::run(gpu, times, |encoder, queries| match queries {
-                        Some(queries) => effect.render_timed(encoder, to, queries, 0),
-                        None => effect.render(encoder, to).map(|()| Vec::new()),
+                        Some(queries) => view.render_timed(encoder, to, queries, 0),
+                        None => view.render(encoder, to).map(|()| Vec::new()),
                     })
                 };
                 if let Some(atlas) = &self.atlas {

@@ -6,9 +6,9 @@
 use std::rc::Rc;
 
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Atlas, Plan, Profile, TextureSpace};
+use subsurface::{Atlas, Plan, Profile};
 use subsurface_lab::Error;
-use subsurface_lab::method::{self, Ours, ScreenMethod};
+use subsurface_lab::method::{self, Ours, OursUnrolled, ScreenMethod};
 use subsurface_lab::metrics::{self, Layer};
 use subsurface_lab::renderer::{AtlasRenderer, Gpu, Timestamps};
 use subsurface_lab::rivals;
@@ -53,7 +53,7 @@ enum Method {
     /// Light as it falls.
     None,
     Screen(Box<dyn ScreenMethod>),
-    Texture(TextureSpace, AtlasRenderer),
+    Texture(OursUnrolled, AtlasRenderer),
 }
 
 impl Entry {
@@ -99,7 +99,7 @@ impl Bench {
         entries.insert(0, Entry::new("none", "", Method::None));
         entries.insert(1, Entry::new("screen_exact", "", Method::Screen(Box::new(exact))));
         let atlas = AtlasRenderer::new(&gpu, &shot.renderer, shot.atlas_size)?;
-        let effect = TextureSpace::new(&gpu.device, OUTPUT, profiles)?;
+        let effect = OursUnrolled::new(&gpu.device, OUTPUT, profiles)?;
         entries.push(Entry::new("texture_separable", shot.atlas_size, Method::Texture(effect, atlas)));
         let ids = wait::bytes(gpu.copy_out(shot.renderer.gbuffer.profile_id.texture())).await?;
         let skin: Vec<bool> = ids.into_iter().map(|id| id == 1).collect(); // the one profile

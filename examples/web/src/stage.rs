@@ -3,9 +3,9 @@
 use std::rc::Rc;
 
 use subsurface::wgpu::TextureView;
-use subsurface::{Overlay, Plan, TextureSpace};
+use subsurface::{Overlay, Plan};
 use subsurface_lab::Error;
-use subsurface_lab::method::{self, Ours};
+use subsurface_lab::method::{self, Ours, OursUnrolled};
 use subsurface_lab::renderer::{
     AtlasRenderer, Camera, Gpu, Layer, Lighting, Orbit, Renderer, Scene, View, turn_light,
 };
@@ -87,7 +87,7 @@ pub struct Stage {
 struct Effects {
     screen: Option<Ours>,
     exact: Option<Ours>,
-    texture: Option<TextureSpace>,
+    texture: Option<OursUnrolled>,
     atlas: Option<AtlasRenderer>,
     overlay: Option<Overlay>,
 }
@@ -262,7 +262,7 @@ impl Stage {
                 method::scatter(gpu, ours, &shot.frame(), &output)?;
             }
             Mode::Texture => {
-                let effect = || Ok(TextureSpace::new(&gpu.device, format, profiles)?);
+                let effect = || OursUnrolled::new(&gpu.device, format, profiles);
                 let effect = made(&mut effects.texture, effect)?;
                 let atlas = || AtlasRenderer::new(gpu, &shot.renderer, shot.atlas_size);
                 let atlas = made(&mut effects.atlas, atlas)?;

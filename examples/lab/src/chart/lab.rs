@@ -6,8 +6,8 @@ use crate::Error;
 use glam::Vec3;
 use image::RgbImage;
 use indicatif::{ProgressBar, ProgressStyle};
+use subsurface::Profile;
 use subsurface::wgpu::{Features, TextureFormat, TextureView};
-use subsurface::{Profile, TextureSpace};
 
 use crate::chart::clock::{self, Clock};
 use crate::chart::costs;
@@ -20,7 +20,7 @@ use crate::chart::scene::{Head, Scene, Surface, rgb};
 use crate::chart::score::{Knows, Score};
 use crate::chart::truths::Truths;
 use crate::chart::turning;
-use crate::method::{self, AtlasMethod, Ours, ScreenMethod};
+use crate::method::{self, AtlasMethod, Ours, OursUnrolled, ScreenMethod};
 use crate::renderer::{AtlasRenderer, Gpu, Scene as Model};
 use crate::rivals;
 
@@ -224,7 +224,7 @@ impl<'a> Lab<'a> {
         let mut images = images_of(&name, score, Knows::Mesh);
         let mut methods: Vec<(&str, u32, Box<dyn AtlasMethod>)> = Vec::new();
         for size in self.plan.atlases {
-            let ours = TextureSpace::new(&self.gpu.device, OUTPUT, &[Profile::SKIN])?;
+            let ours = OursUnrolled::new(&self.gpu.device, OUTPUT, &[Profile::SKIN])?;
             methods.push(("texture_separable", *size, Box::new(ours)));
             for (name, _, method) in rivals::atlas(&self.gpu.device, OUTPUT, &Profile::SKIN) {
                 // One timed run at one head is enough for the full convolution: it takes long.
@@ -355,7 +355,7 @@ impl<'a> Lab<'a> {
         copy.retain(|(name, ..)| *name == "copy");
         let mut planned = Ours::new(device, OUTPUT, plan)?;
         let mut exact = Ours::new(device, OUTPUT, &exact)?;
-        let mut separable = TextureSpace::new(device, OUTPUT, &[Profile::SKIN])?;
+        let mut separable = OursUnrolled::new(device, OUTPUT, &[Profile::SKIN])?;
         let mut full = rivals::atlas(device, OUTPUT, &Profile::SKIN);
         full.retain(|(name, ..)| *name == "texture_2d");
         let mut methods: Vec<_> =
@@ -417,7 +417,7 @@ impl<'a> Lab<'a> {
         let mut screen = Ours::new(device, OUTPUT, &exact)?;
         let mut methods: Vec<(&str, u32, usize, Box<dyn AtlasMethod>)> = Vec::new();
         for (size, measured) in self.plan.atlases.iter().zip(self.plan.heads) {
-            let ours = TextureSpace::new(device, OUTPUT, &[Profile::SKIN])?;
+            let ours = OursUnrolled::new(device, OUTPUT, &[Profile::SKIN])?;
             methods.push(("texture_separable", *size, *measured, Box::new(ours)));
         }
         for (name, _, method) in rivals::atlas(device, OUTPUT, &Profile::SKIN) {

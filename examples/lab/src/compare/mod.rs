@@ -15,10 +15,10 @@ use crate::Error;
 use glam::{Mat4, Vec3, Vec4};
 use image::RgbImage;
 use indicatif::{ProgressBar, ProgressStyle};
-use subsurface::{Atlas, DEFAULT_MAX_ERROR, Frame, Plan, Profile, TextureSpace, wgpu};
+use subsurface::{Atlas, DEFAULT_MAX_ERROR, Frame, Plan, Profile, wgpu};
 
 use crate::chart::truths::eq7;
-use crate::method::{self, Ours, ScreenMethod};
+use crate::method::{self, Ours, OursUnrolled, ScreenMethod};
 use crate::metrics::{self, Layer};
 use crate::profile::Description;
 use crate::renderer::{
@@ -559,7 +559,7 @@ impl Shot {
         let atlas = AtlasRenderer::new(gpu, renderer, options.texture_size)?;
         let output = renderer.scattered_target(gpu);
         let format = output.texture().format();
-        let mut effect = TextureSpace::new(&gpu.device, format, &[options.profile])?;
+        let mut effect = OursUnrolled::new(&gpu.device, format, &[options.profile])?;
         let (mut raster, mut blur, mut both) = (Vec::new(), Vec::new(), Vec::new());
         let timed = Instant::now();
         while more_runs(both.len(), most_runs, timed) {

@@ -5,10 +5,10 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3, DVec4, Mat4, Vec4};
 use subsurface::wgpu::TextureFormat;
-use subsurface::{Atlas, Frame, Plan, Profile, TextureSpace};
+use subsurface::{Atlas, Frame, Plan, Profile};
 
 use super::edge::{scattered_step, step, terms};
-use crate::method::{self, AtlasMethod, Ours, ScreenMethod};
+use crate::method::{self, AtlasMethod, Ours, OursUnrolled, ScreenMethod};
 use crate::renderer::Gpu;
 
 const FORMAT: TextureFormat = TextureFormat::Rgba16Float;
@@ -371,7 +371,7 @@ fn atlas_rivals_beat_no_scattering_on_an_edge() {
     ];
     let skin = terms(&Profile::SKIN);
     let mut methods = super::atlas(&gpu().device, FORMAT, &Profile::SKIN);
-    let ours = TextureSpace::new(&gpu().device, FORMAT, &[Profile::SKIN]).unwrap();
+    let ours = OursUnrolled::new(&gpu().device, FORMAT, &[Profile::SKIN]).unwrap();
     methods.push(("subsurface", String::new(), Box::new(ours)));
     for (name, _, mut method) in methods {
         for (patch, u, v) in patches {

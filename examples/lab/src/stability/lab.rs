@@ -5,10 +5,10 @@ use std::sync::{Arc, Mutex};
 
 use glam::Vec3;
 use subsurface::wgpu::{CommandEncoder, TextureFormat, TextureView};
-use subsurface::{Atlas, DEFAULT_MAX_ERROR, Frame, Plan, Profile, TextureSpace};
+use subsurface::{Atlas, DEFAULT_MAX_ERROR, Frame, Plan, Profile};
 
 use crate::Error;
-use crate::method::{self, AtlasMethod, Ours, ScreenMethod};
+use crate::method::{self, AtlasMethod, Ours, OursUnrolled, ScreenMethod};
 use crate::renderer::Gpu;
 use crate::rivals;
 use crate::stability::case::{ATLAS, EXACT, PLAN, Results};
@@ -177,7 +177,7 @@ impl Lab {
 /// A device that one of them refuses.
 pub fn ours(gpu: &Gpu, plan: &Plan) -> Result<Methods, Error> {
     let screen = |plan| Ours::new(&gpu.device, OUTPUT, plan).map(|m| Method::Screen(Box::new(m)));
-    let atlas = TextureSpace::new(&gpu.device, OUTPUT, plan.profiles())?;
+    let atlas = OursUnrolled::new(&gpu.device, OUTPUT, plan.profiles())?;
     Ok(vec![
         (EXACT, screen(&Plan::exact(plan.profiles())?)?),
         (PLAN, screen(plan)?),
