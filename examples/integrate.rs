@@ -48,7 +48,7 @@ impl Skin {
         frame.profile_id = Some(&g.profile_id); // 1 on skin, 0 elsewhere
         frame.mm_per_unit = 1000.0; // a scene in metres
         let back = g.back.as_ref(); // for light from behind: ears, nostrils, fingers
-        frame.back = back.map(|[irradiance, depth]| BackLayer { irradiance, depth, profile_id: None });
+        frame.back = back.map(|[irradiance, depth]| BackLayer::new(irradiance, depth));
         self.view.prepare(device, queue, &self.effect, &frame)?;
         self.view.render(encoder, scattered)
     }
@@ -81,11 +81,8 @@ impl SkinAtlas {
         unrolled: &Unrolled,
         scattered: &TextureView,
     ) -> Result<(), Error> {
-        let atlas = Atlas {
-            irradiance: &unrolled.irradiance,
-            positions: &unrolled.positions, // in metres, and 1 where there is skin
-            mm_per_unit: 1000.0,
-        };
+        // Positions in metres, and 1 where there is skin.
+        let atlas = Atlas::new(&unrolled.irradiance, &unrolled.positions);
         self.view.prepare(device, queue, &self.effect, &atlas)?;
         self.view.render(encoder, scattered)
     }

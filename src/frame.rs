@@ -68,14 +68,22 @@ pub struct Frame<'a> {
 /// Each Gaussian is summed over both layers by distance in space and divided by its mass over both, so that even
 /// light stays even.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct BackLayer<'a> {
     /// Lit diffuse irradiance of the back, as [`Frame::irradiance`] is. Alpha is not read.
     pub irradiance: &'a TextureView,
     /// Its depth, as [`Frame::depth`] is; that of the far plane where there is no back.
     pub depth: &'a TextureView,
     /// Its profiles, as [`Frame::profile_id`] has them; a layer scatters to pixels of its own profile alone.
-    /// `None`: those of the visible surface in the same pixel.
+    /// Default, `None`: those of the visible surface in the same pixel.
     pub profile_id: Option<&'a TextureView>,
+}
+
+impl<'a> BackLayer<'a> {
+    /// A layer of these two, of the profiles of the visible surface.
+    pub fn new(irradiance: &'a TextureView, depth: &'a TextureView) -> Self {
+        Self { irradiance, depth, profile_id: None }
+    }
 }
 
 /// A rectangle of pixels, counted from the left and from above.

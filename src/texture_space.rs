@@ -19,6 +19,7 @@ const GUTTER: i32 = 4;
 /// for one point. All textures are two-dimensional, single-sampled, of one size, and have the usage
 /// `TEXTURE_BINDING`.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Atlas<'a> {
     /// Lit diffuse irradiance E at each texel, linear and finite RGB, before albedo. Three or four float
     /// channels.
@@ -27,8 +28,15 @@ pub struct Atlas<'a> {
     /// 1; 0 where there is no surface. Rgba32Float. Relative to the mesh where the world is large: a
     /// kilometre away a float's step is 0.06 mm.
     pub positions: &'a TextureView,
-    /// Length of a scene unit in mm: 1000 where the scene is in metres.
+    /// Length of a scene unit in mm. Default: 1000, a scene in metres.
     pub mm_per_unit: f32,
+}
+
+impl<'a> Atlas<'a> {
+    /// An atlas of these two, in metres.
+    pub fn new(irradiance: &'a TextureView, positions: &'a TextureView) -> Self {
+        Self { irradiance, positions, mm_per_unit: 1000.0 }
+    }
 }
 
 /// Scattering over an atlas (Li & Shao 2015, Eq. 7 to 12): each Gaussian in two passes along u and the

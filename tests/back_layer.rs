@@ -153,7 +153,7 @@ fn without_ids_of_its_own_a_back_is_of_the_pixels_profile() {
         let mut ours = ours(plan, FULL);
         let with = front.scatter_over(Some(&back), &mut ours, |_| ());
         let without = front.scatter_over(Some(&back), &mut ours, |frame| {
-            frame.back = frame.back.map(|back| subsurface::BackLayer { profile_id: None, ..back });
+            frame.back = frame.back.map(|back| subsurface::BackLayer::new(back.irradiance, back.depth));
         });
         assert_eq!(with, without);
     }

@@ -89,8 +89,11 @@ impl Inputs {
         frame.strength = self.strength.as_ref();
         frame.albedo = self.albedo.as_ref();
         let back = self.back.as_ref();
-        let profile_id = self.back_id.as_ref();
-        frame.back = back.map(|[irradiance, depth]| BackLayer { irradiance, depth, profile_id });
+        frame.back = back.map(|[irradiance, depth]| {
+            let mut layer = BackLayer::new(irradiance, depth);
+            layer.profile_id = self.back_id.as_ref();
+            layer
+        });
         frame.viewport = self.viewport;
         frame.mm_per_unit = self.mm_per_unit;
         frame
@@ -308,7 +311,8 @@ fn the_atlas_is_checked_too() {
     let mut atlas_view = AtlasView::new();
     let irradiance = view(HALF);
     let mut prepare = |positions: &TextureView, mm_per_unit: f32| {
-        let atlas = Atlas { irradiance: &irradiance, positions, mm_per_unit };
+        let mut atlas = Atlas::new(&irradiance, positions);
+        atlas.mm_per_unit = mm_per_unit;
         atlas_view.prepare(&gpu.device, &gpu.queue, &effect, &atlas)
     };
     let positions = view(TextureFormat::Rgba32Float);

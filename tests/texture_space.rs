@@ -35,7 +35,7 @@ fn scatter(size: u32, profile: &Profile, texel: impl Fn(DVec2) -> Texel) -> Vec<
     let [irradiance, positions] = &textures(size, texel);
     let output = gpu.target("output", [size; 2], FORMAT);
     let mut path = OursUnrolled::new(&gpu.device, FORMAT, &[*profile]).unwrap();
-    let atlas = Atlas { irradiance, positions, mm_per_unit: 1000.0 };
+    let atlas = Atlas::new(irradiance, positions);
     method::scatter_atlas(gpu, &mut path, &atlas, &output).unwrap();
     gpu.read(&output).iter().map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into())).collect()
 }
@@ -144,7 +144,8 @@ fn two_atlases_share_a_submission() {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut views = scales.map(|_| AtlasView::new());
         for ((view, output), mm_per_unit) in views.iter_mut().zip(&outputs).zip(scales) {
-            let atlas = Atlas { irradiance, positions, mm_per_unit };
+            let mut atlas = Atlas::new(irradiance, positions);
+            atlas.mm_per_unit = mm_per_unit;
             view.prepare(&gpu.device, &gpu.queue, &effect, &atlas).unwrap();
             view.render(&mut encoder, output).unwrap();
         }
@@ -154,7 +155,8 @@ fn two_atlases_share_a_submission() {
     // In turn, by one view.
     let mut alone = OursUnrolled { effect, view: AtlasView::new() };
     for ((output, expected), mm_per_unit) in outputs.iter().zip(&together).zip(scales) {
-        let atlas = Atlas { irradiance, positions, mm_per_unit };
+        let mut atlas = Atlas::new(irradiance, positions);
+        atlas.mm_per_unit = mm_per_unit;
         method::scatter_atlas(gpu, &mut alone, &atlas, output).unwrap();
         assert_eq!(gpu.read(output), *expected, "{mm_per_unit}");
     }

@@ -174,10 +174,10 @@ impl GBuffer {
         let mut frame = Frame::new(&irradiance, &depth, projection);
         frame.profile_id = Some(&id);
         frame.mm_per_unit = 1.0;
-        frame.back = back.as_ref().map(|[irradiance, depth, id]| BackLayer {
-            irradiance,
-            depth,
-            profile_id: Some(id),
+        frame.back = back.as_ref().map(|[irradiance, depth, id]| {
+            let mut layer = BackLayer::new(irradiance, depth);
+            layer.profile_id = Some(id);
+            layer
         });
         change(&mut frame);
         let output = gpu.target("output", size, ours.effect.output().format());

@@ -129,7 +129,7 @@ fn scatter(gpu: &Gpu, dump: &Dump, plan: &Plan) -> Result<Vec<[f32; 3]>, Error> 
         let light = gpu.upload("back irradiance", size, format, &back.irradiance);
         (light, gpu.upload("back depth", size, TextureFormat::R32Float, &back.depth))
     });
-    frame.back = back.as_ref().map(|(irradiance, depth)| BackLayer { irradiance, depth, profile_id: None });
+    frame.back = back.as_ref().map(|(irradiance, depth)| BackLayer::new(irradiance, depth));
     let mut ours = Ours::new(device, format, plan)?;
     method::scatter(gpu, &mut ours, &frame, &output).map_err(|e| dump.camera.error(e))?;
     // Innermost first.

@@ -178,7 +178,8 @@ impl AtlasRenderer {
                 gpu.run(|encoder| self.draw_atlas(encoder, renderer, mesh, page.clone()));
                 raster_ms += start.elapsed().as_secs_f64() * 1e3;
 
-                let atlas = Atlas { irradiance: &self.irradiance, positions: &self.positions, mm_per_unit };
+                let mut atlas = Atlas::new(&self.irradiance, &self.positions);
+                atlas.mm_per_unit = mm_per_unit;
                 scatter(&atlas, &self.scattered)?;
 
                 gpu.run(|encoder| self.draw_screen(encoder, renderer, mesh, page.clone(), output));

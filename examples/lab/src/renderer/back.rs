@@ -84,6 +84,8 @@ impl BackRenderer {
 
     /// As the effects take it.
     pub fn layer(&self) -> BackLayer<'_> {
-        BackLayer { irradiance: &self.irradiance, depth: &self.depth, profile_id: Some(&self.profile_id) }
+        let mut layer = BackLayer::new(&self.irradiance, &self.depth);
+        layer.profile_id = Some(&self.profile_id);
+        layer
     }
 }

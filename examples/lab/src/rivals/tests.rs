@@ -325,11 +325,9 @@ fn scatter_atlas(method: &mut dyn AtlasMethod, size: u32, texel: impl Fn(DVec2) 
     }
     let floats = TextureFormat::Rgba32Float;
     let output = gpu.target("output", [size; 2], FORMAT);
-    let atlas = Atlas {
-        irradiance: &gpu.upload("irradiance", [size; 2], floats, &irradiance),
-        positions: &gpu.upload("positions", [size; 2], floats, &positions),
-        mm_per_unit: 1000.0,
-    };
+    let irradiance = gpu.upload("irradiance", [size; 2], floats, &irradiance);
+    let positions = gpu.upload("positions", [size; 2], floats, &positions);
+    let atlas = Atlas::new(&irradiance, &positions);
     method::scatter_atlas(gpu, method, &atlas, &output).unwrap();
     gpu.read(&output)
 }

@@ -112,12 +112,14 @@ impl Uploaded {
         frame.profile_id = Some(&self.profile_id);
         frame.mm_per_unit = self.mm_per_unit;
         let back = self.back.as_ref();
-        frame.back = back.map(|[irradiance, depth]| BackLayer { irradiance, depth, profile_id: None });
+        frame.back = back.map(|[irradiance, depth]| BackLayer::new(irradiance, depth));
         frame
     }
 
     pub fn atlas(&self) -> Atlas<'_> {
-        Atlas { irradiance: &self.irradiance, positions: &self.positions, mm_per_unit: self.mm_per_unit }
+        let mut atlas = Atlas::new(&self.irradiance, &self.positions);
+        atlas.mm_per_unit = self.mm_per_unit;
+        atlas
     }
 }
 

@@ -112,7 +112,9 @@ impl Unwrapped {
 impl Uploaded {
     /// In mm, of skin.
     pub fn atlas(&self) -> Atlas<'_> {
-        Atlas { irradiance: &self.irradiance, positions: &self.positions, mm_per_unit: 1.0 }
+        let mut atlas = Atlas::new(&self.irradiance, &self.positions);
+        atlas.mm_per_unit = 1.0;
+        atlas
     }
 }
 
