@@ -88,6 +88,17 @@ impl Optics {
         Vec4::new(m.z_axis.z, m.w_axis.z, m.z_axis.w, m.w_axis.w)
     }
 
+    /// The pixels to a mm of a surface that faces the camera at the near plane, along the axis that has fewer; endless
+    /// where that is not known.
+    pub(crate) fn nearest_px_per_mm(&self) -> f64 {
+        let [x, y, z, w] = self.depth_to_mm().to_array();
+        let near = 1.0 - self.far;
+        let s = self.spacing();
+        let z = (x * near + y) / (z * near + w);
+        let mm = (s.x + s.y * z).abs().max((s.z + s.w * z).abs());
+        if mm > 0.0 { f64::from(mm).recip() } else { f64::INFINITY }
+    }
+
     /// The mm between pixels of a surface that faces the camera, at z mm in view space: along a row
     /// |x + y·z|, along a column |z + w·z|; signed as the axes of the picture are.
     pub(crate) fn spacing(&self) -> Vec4 {

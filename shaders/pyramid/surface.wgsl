@@ -87,6 +87,9 @@ const PROFILES = 0xffffu << PROFILE_SHIFT;
 const GRIDS = 11u;
 const ROWS_PER_OCTAVE = 6.0;
 
+// Whether all skin is of one profile: what is none has no light, so that no id needs to be looked at.
+override ONE_PROFILE: bool = false;
+
 const TILE = 8u;
 // How far from the plane a pixel may lie to be of the same surface, in mm a pixel of the level.
 const TOLERANCE = 2.0;
@@ -143,6 +146,11 @@ fn half_floats(v: vec4f) -> vec4f {
     return vec4f(unpack2x16float(pack2x16float(v.xy)), unpack2x16float(pack2x16float(v.zw)));
 }
 
+// Whether light that weighs its area is of a profile.
+fn is_of(shape: vec2u, id: u32) -> bool {
+    return ONE_PROFILE || shape.x >> 24u == id;
+}
+
 // Slopes are kept as sines.
 fn packed(id: u32, z: f32, sines: vec2f) -> vec2u {
     let steps = vec2u(clamp(sines * 2047.0 + 2048.5, vec2f(0.0), vec2f(4095.0)));
@@ -188,4 +196,9 @@ fn plane_of(pixel: vec2i, shape: Shape) -> Plane {
     let dx = vec3f(r.xy * dz.x + vec2f(mm.x, 0.0), dz.x);
     let dy = vec3f(r.xy * dz.y + vec2f(0.0, mm.y), dz.y);
     return Plane(shape.z, dx, dy, r.xy, vec3f(dot(dx, dx), dot(dx, dy), dot(dy, dy)));
+}
+
+// The plane in steps of so many pixels.
+fn scaled(plane: Plane, side: f32) -> Plane {
+    return Plane(plane.z, side * plane.dx, side * plane.dy, plane.ray, side * side * plane.m);
 }

@@ -117,6 +117,18 @@ impl Weights {
         table
     }
 
+    /// The coarsest level that skin of at most so many px/mm is blurred at. As `coarsest_level` of host.wgsl.
+    pub(crate) fn coarsest_level(&self, px_per_mm: f64) -> usize {
+        let row = ((px_per_mm.log2() - self.first_octave) * ROWS_PER_OCTAVE).ceil() + 2.0;
+        let rows = self.profiles.iter().flat_map(|rows| &rows[..=(row as usize).min(rows.len() - 1)]);
+        rows.map(|row| row.level).max().unwrap_or(0)
+    }
+
+    /// Whether no profile differs from another.
+    pub(crate) fn has_one_profile(&self) -> bool {
+        self.profiles.windows(2).all(|pair| pair[0] == pair[1])
+    }
+
     /// Texel fetches for a pixel of a simple tile at a scale, all levels' shares and the copy included.
     pub(crate) fn fetches(&self, rows: &[Row], px_per_mm: f32) -> f32 {
         let octave = f64::from(px_per_mm).log2() - self.first_octave;

@@ -69,6 +69,7 @@ impl Back {
         device: &Device,
         [pack, halve]: [&Compute; 2],
         front: &Scratch,
+        last: usize,
         weights: &Buffer,
         [irradiance, depth, profile_id]: &Textures,
     ) -> Groups {
@@ -94,7 +95,7 @@ impl Back {
             ],
         );
         let pairs = self.levels.iter().zip(&self.levels[1..]).zip(&front.levels[1..]);
-        let halve = pairs.map(|(([light, shape], halved), level)| {
+        let halve = pairs.take(last).map(|(([light, shape], halved), level)| {
             gpu::group(
                 device,
                 label,

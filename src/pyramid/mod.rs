@@ -53,6 +53,8 @@ struct Groups {
     /// The weights of the plan that they bind.
     weights: Buffer,
     read: Textures,
+    /// The coarsest level that skin at the near plane needs, of those that there are.
+    last: usize,
     viewport: Option<Viewport>,
     pack: BindGroup,
     back: Option<back::Groups>,
@@ -178,6 +180,8 @@ impl Pyramid {
         let widest_mm2 = gaussians.map(|g| g.variance_mm2).fold(0.0, f32::max);
         let back_reach = back::REACH_SIGMAS * widest_mm2.sqrt();
         let plan = &self.plan;
+        let coarsest = plan.coarsest_level(optics.nearest_px_per_mm());
+        let last = coarsest.max(1).min(view.scratch.levels.len() - 1);
         let numbers = scratch::View {
             has_id: u32::from(frame.profile_id.is_some()),
             has_strength: u32::from(frame.strength.is_some()),
@@ -194,7 +198,7 @@ impl Pyramid {
             size: size.into(),
             frame_limit: FRAME_LIMIT.min(FRAME_LIMIT_ERRORS * plan.predicted_error()),
             level_limit: LEVEL_LIMIT,
-            levels: view.scratch.levels.len() as u32 - 1,
+            levels: last as u32,
             back_reach: if frame.back.is_some() { back_reach } else { 0.0 },
         };
         queue.write_buffer(&view.scratch.view, 0, bytemuck::bytes_of(&numbers));
@@ -213,12 +217,15 @@ impl Pyramid {
             }),
         };
         match &mut view.groups {
-            Some(groups) if groups.read == read && groups.weights == self.weights => {
+            Some(groups)
+                if groups.read == read && groups.weights == self.weights && groups.last == last =>
+            {
                 groups.viewport = frame.viewport;
             }
             groups => {
-                view.scratch.set_plan(queue, plan);
-                *groups = Some(self.bind(device, &view.scratch, view.back.as_ref(), read, frame.viewport));
+                view.scratch.set_plan(queue, plan, last);
+                let back = view.back.as_ref();
+                *groups = Some(self.bind(device, &view.scratch, back, read, last, frame.viewport));
             }
         }
     }
@@ -229,6 +236,7 @@ impl Pyramid {
         scratch: &Scratch,
         back: Option<&Back>,
         read: Textures,
+        last: usize,
         viewport: Option<Viewport>,
     ) -> Groups {
         use BindingResource::{Sampler, TextureView as Texture};
@@ -236,7 +244,7 @@ impl Pyramid {
             gpu::group(device, "subsurface::pyramid", layout, resources)
         };
         let passes = &self.passes;
-        let levels = &scratch.levels;
+        let levels = &scratch.levels[..=last];
         let base = &levels[0];
         let view = scratch.view.as_entire_binding();
         let blur = |pass: &OverTiles, l: usize| {
@@ -255,17 +263,17 @@ impl Pyramid {
                 (9, Texture(mean)),
                 (10, Texture(shape)),
                 (12, Sampler(&self.linear)),
+                (13, scratch.steps.as_entire_binding()),
+                (14, Texture(&scratch.lights)),
+                (15, Texture(&scratch.shapes)),
+                // Where there is no back these are not looked at.
+                (16, Texture(back.map_or(&scratch.lights, |back| &back.lights))),
+                (17, Texture(back.map_or(&scratch.shapes, |back| &back.shapes))),
             ];
             if l == 0 {
                 resources.push((4, Texture(&read.strength)));
                 resources.push((5, Texture(&read.albedo)));
                 resources.push((6, Texture(&read.irradiance)));
-                resources.push((13, scratch.steps.as_entire_binding()));
-                resources.push((14, Texture(&scratch.lights)));
-                resources.push((15, Texture(&scratch.shapes)));
-                // Where there is no back these are not looked at.
-                resources.push((16, Texture(back.map_or(&scratch.lights, |back| &back.lights))));
-                resources.push((17, Texture(back.map_or(&scratch.shapes, |back| &back.shapes))));
             }
             group(&pass.layout, &resources)
         };
@@ -282,6 +290,7 @@ impl Pyramid {
         };
         Groups {
             weights: self.weights.clone(),
+            last,
             viewport,
             pack: group(
                 &passes.pack.layout,
@@ -311,10 +320,10 @@ impl Pyramid {
             ),
             back: back.zip(read.back.as_ref()).map(|(back, read)| {
                 let computes = [&passes.pack_back, &passes.halve_back];
-                back.bind(device, computes, scratch, &self.weights, read)
+                back.bind(device, computes, scratch, last, &self.weights, read)
             }),
-            downsample: (1..levels.len()).map(downsample).collect(),
-            level: (1..levels.len()).map(|l| blur(&passes.level, l)).collect(),
+            downsample: (1..=last).map(downsample).collect(),
+            level: (1..=last).map(|l| blur(&passes.level, l)).collect(),
             frame: blur(&passes.frame, 0),
             copy: group(
                 &passes.copy_layout,
@@ -384,7 +393,7 @@ impl Pyramid {
             }
             pass.set_pipeline(&passes.list_tiles.pipeline);
             pass.set_bind_group(0, &groups.list_tiles, &[]);
-            pass.dispatch_workgroups(x.div_ceil(8), y.div_ceil(8), scratch.levels.len() as u32);
+            pass.dispatch_workgroups(x.div_ceil(8), y.div_ceil(8), groups.last as u32 + 1);
         }
         if let Some(back) = &groups.back {
             back.halve(recorder, &passes.halve_back, scratch);
@@ -394,7 +403,7 @@ impl Pyramid {
             let mut pass = recorder.draw(&label, &[&level.light, &level.shape], false);
             over_tiles(&mut pass, &passes.downsample, group, scratch, l, false);
         }
-        for l in (1..scratch.levels.len()).rev() {
+        for l in (1..=groups.last).rev() {
             let (group, level) = (&groups.level[l - 1], &scratch.levels[l]);
             let label = format!("subsurface::pyramid blur level {l}");
             let mut pass = recorder.draw(&label, &[scratch.mean(l)], false);

@@ -28,7 +28,6 @@ pub(super) const PACK: &[&str] = &[SURFACE, HOST, wgsl!("pack")];
 pub(super) const LIST_TILES: &[&str] = &[SURFACE, TILES];
 const DOWNSAMPLE: &[&str] = &[SURFACE, wgsl!("downsample")];
 pub(super) const PLANAR: &[&str] = &[SURFACE, BLUR, wgsl!("planar")];
-const GENERAL: &[&str] = &[SURFACE, BLUR, wgsl!("general")];
 pub(super) const DIRECT: &[&str] = &[SURFACE, BLUR, wgsl!("direct")];
 const PACK_BACK: &[&str] = &[SURFACE, HOST, wgsl!("pack"), wgsl!("pack_back")];
 const HALVE_BACK: &[&str] = &[SURFACE, wgsl!("downsample"), wgsl!("halve_back")];
@@ -98,8 +97,9 @@ impl Passes {
                         ("DIFFERENCE", flag(output.is_difference())),
                     ]);
                 }
-                if has_back {
-                    constants.push(("BACK", 1.0));
+                if files == DIRECT {
+                    constants.push(("ONE_PROFILE", flag(plan.has_one_profile())));
+                    constants.push(("BACK", flag(has_back)));
                 }
                 let module: ShaderModule = gpu::module(device, &label, files);
                 gpu::Draw {
@@ -130,20 +130,13 @@ impl Passes {
             (9, FILTERED),
             (10, UINTS),
             (12, SAMPLER),
+            (13, UNIFORM),
+            (14, FLOATS),
+            (15, UINTS),
+            (16, FLOATS),
+            (17, UINTS),
         ];
-        let frame: Vec<_> = level
-            .into_iter()
-            .chain([
-                (4, FLOATS),
-                (5, FLOATS),
-                (6, FLOATS),
-                (13, UNIFORM),
-                (14, FLOATS),
-                (15, UINTS),
-                (16, FLOATS),
-                (17, UINTS),
-            ])
-            .collect();
+        let frame: Vec<_> = level.into_iter().chain([(4, FLOATS), (5, FLOATS), (6, FLOATS)]).collect();
         let copy_label = "subsurface::pyramid fs_copy";
         let copy_layout = gpu::layout(
             device,
@@ -213,7 +206,7 @@ impl Passes {
             ),
             level: over_tiles(
                 "fs_level",
-                &[("vs_corner", PLANAR), ("vs_tile", GENERAL)],
+                &[("vs_corner", PLANAR), ("vs_tile", DIRECT)],
                 &level,
                 &[LIGHT],
                 Some(&plan.kernels.coarse),

@@ -262,10 +262,9 @@ impl Scratch {
         }
     }
 
-    /// Uploads what the blurs of each level are by this plan.
-    pub(super) fn set_plan(&self, queue: &Queue, plan: &Weights) {
-        let last = self.levels.len() - 1;
-        for (l, level) in self.levels.iter().enumerate() {
+    /// Uploads what the blurs of each level are by this plan, of which `last` is the coarsest.
+    pub(super) fn set_plan(&self, queue: &Queue, plan: &Weights, last: usize) {
+        for (l, level) in self.levels[..=last].iter().enumerate() {
             let settings = level_settings(plan, l, last, level);
             queue.write_buffer(&level.settings, 0, bytemuck::bytes_of(&settings));
         }

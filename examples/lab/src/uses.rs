@@ -174,21 +174,25 @@ impl<'a> Seen<'a> {
         let [planar, direct] = [0, 1].map(|kind| pixels(0, kind));
         // Tiles do not say whether the square is summed in them: a share of the planar pixels, as the rows say.
         let square = (f64::from(planar) * self.share_with_square(plan)) as u32;
-        let trips = self.trips(plan, &counted.direct).map(|t| format!("{t:.2}")).join(" ");
+        let trips =
+            |level: usize| self.trips(plan, level, &counted.direct[level]).map(|t| format!("{t:.2}"));
+        let of_frame = trips(0).join(" ");
         for (pass, on, trips) in [
             (format!("frame planar {error}"), planar - square, ""),
             (format!("frame planar square {error}"), square, ""),
-            (direct_pass, direct, &*trips),
+            (direct_pass, direct, &*of_frame),
         ] {
             if on > 0 {
                 uses.add(method, &pass, on, 0, "tiles", trips);
             }
         }
         for level in 1..counted.levels.len() {
-            for (kind, on) in [("planar", pixels(level, 0)), ("general", pixels(level, 1))] {
+            for (kind, on) in [("planar", pixels(level, 0)), ("direct", pixels(level, 1))] {
                 if on > 0 {
+                    // A level sums its own Gaussians alone.
+                    let trips = if kind == "direct" { trips(level)[1..].join(" ") } else { String::new() };
                     uses.add(method, &format!("down {kind}"), on, 0, "tiles", "");
-                    uses.add(method, &format!("level {kind} {error}"), on, 0, "tiles", "");
+                    uses.add(method, &format!("level {kind} {error}"), on, 0, "tiles", &trips);
                 }
             }
         }
@@ -233,19 +237,24 @@ impl<'a> Seen<'a> {
         (z.fold(f64::MAX, f64::min) * self.ray_step).recip()
     }
 
-    /// How often the loops of direct.wgsl go round in direct tiles: for each pixel the Gaussians that are
-    /// summed, of each its rows, of each its taps.
-    fn trips(&self, plan: &Plan, tiles: &[[u32; 2]]) -> [f64; 3] {
-        let skin =
-            tiles.iter().flat_map(|tile| pixels_of(*tile, TILE)).filter(|pixel| self.is_skin[*pixel]);
-        let sums: Vec<Vec<[f64; 2]>> = skin.map(|pixel| self.sums(plan, pixel)).collect();
+    /// How often the loops of direct.wgsl go round in direct tiles of a level: for each pixel the Gaussians that
+    /// are summed, of each its rows, of each its pairs of taps.
+    fn trips(&self, plan: &Plan, level: usize, tiles: &[[u32; 2]]) -> [f64; 3] {
+        let skin = tiles
+            .iter()
+            .flat_map(|tile| pixels_of(*tile, TILE << level))
+            .filter(|pixel| self.is_skin[*pixel]);
+        let sums: Vec<Vec<[f64; 2]>> = skin.map(|pixel| self.sums(plan, level, pixel)).collect();
         let total = |i: usize| sums.iter().flatten().map(|sum| sum[i]).sum::<f64>();
         let count: usize = sums.iter().map(Vec::len).sum();
-        [count as f64 / sums.len() as f64, total(0) / count as f64, total(1) / total(0)]
+        // Of nothing that is summed there are no rows.
+        let mean = |sum: f64, count: f64| if count > 0.0 { sum / count } else { 0.0 };
+        [mean(count as f64, sums.len() as f64), mean(total(0), count as f64), mean(total(1), total(0))]
     }
 
-    /// Rows and taps of the Gaussians that are summed directly at a pixel, as `gathered` in direct.wgsl has it.
-    fn sums(&self, plan: &Plan, pixel: usize) -> Vec<[f64; 2]> {
+    /// Rows and pairs of taps of the Gaussians that are summed directly at a pixel, as `gathered` in direct.wgsl has
+    /// it; on a level as `fs_level` does, with the frame's pixels for those of the level.
+    fn sums(&self, plan: &Plan, on_level: usize, pixel: usize) -> Vec<[f64; 2]> {
         let Scale { mm2, rows: [row, next] } = self.scale(plan, pixel);
         let (row, next) = (&plan.rows(0)[row], &plan.rows(0)[next]);
         let at = DVec2::new((pixel as u32 % SIZE[0]).into(), (pixel as u32 / SIZE[0]).into()) + 0.5;
@@ -267,12 +276,17 @@ impl<'a> Seen<'a> {
                 (weight, moment / weight.max(1e-6))
             };
             let channels = [0, 1, 2].map(channel);
+            if on_level > 0 && level != on_level {
+                continue;
+            }
             if level > next.level || channels.iter().all(|(weight, _)| *weight <= LEAST_WEIGHT) {
                 continue;
             }
             let variance = channels.iter().map(|(_, mean)| *mean).fold(0.0, f64::max);
             let side = f64::powi(2.0, level as i32);
-            let own = 0.25 * (1.0 - 1.0 / (side * side));
+            // A level's light goes down, and up again.
+            let ways = if on_level > 0 { 0.5 } else { 0.25 };
+            let own = ways * (1.0 - 1.0 / (side * side));
             let mm = facing_mm * side;
             let variance_px2 = variance * mm2 * side * side / (mm * mm) - own;
             let reach = (CUT * variance_px2.max(0.15)).sqrt().min(REACH);
@@ -280,14 +294,14 @@ impl<'a> Seen<'a> {
             let last = (DVec2::new(SIZE[0].into(), SIZE[1].into()) / side).floor() - 1.0;
             let (first, end) =
                 ((center - reach).ceil().max(DVec2::ZERO), (center + reach).floor().min(last));
-            let (mut rows, mut taps) = (0.0, 0.0);
+            let (mut rows, mut pairs) = (0.0, 0.0);
             for y in first.y as i32..=end.y as i32 {
                 let half = (reach * reach - (f64::from(y) - center.y).powi(2)).max(0.0).sqrt();
                 rows += 1.0;
-                taps += ((center.x + half).floor().min(last.x) - (center.x - half).ceil().max(0.0) + 1.0)
-                    .max(0.0);
+                let row = (center.x + half).floor().min(last.x) - (center.x - half).ceil().max(0.0) + 1.0;
+                pairs += (0.5 * row.max(0.0)).ceil();
             }
-            sums.push([rows, taps]);
+            sums.push([rows, pairs]);
         }
         sums
     }
@@ -335,7 +349,8 @@ fn tiles(side: u32) -> impl Iterator<Item = [u32; 2]> {
 
 /// The pixels of one.
 fn pixels_of([x, y]: [u32; 2], side: u32) -> impl Iterator<Item = usize> {
-    (0..side * side).map(move |i| index(x * side + i % side, y * side + i / side))
+    let pixels = (0..side * side).map(move |i| [x * side + i % side, y * side + i / side]);
+    pixels.filter(|[x, y]| *x < SIZE[0] && *y < SIZE[1]).map(|[x, y]| index(x, y))
 }
 
 fn index(x: u32, y: u32) -> usize {
@@ -357,11 +372,12 @@ fn scattered(
 
 /// Tiles, as the device listed them.
 struct Counted {
-    /// Of each level the planar ones, and the others: direct on the frame, general above.
+    /// Of each level the planar ones, and those that are summed directly.
     tiles: Vec<[u32; KINDS]>,
     /// Columns and rows of tiles of each level.
     levels: Vec<[u32; 2]>,
-    direct: Vec<[u32; 2]>,
+    /// The latter, of each level.
+    direct: Vec<Vec<[u32; 2]>>,
     /// Tiles of each level that have a back layer within reach; empty without one.
     back: Vec<u32>,
 }
@@ -375,10 +391,16 @@ impl Counted {
         let draws: Vec<u32> = draws.chunks_exact(DRAW_WORDS).map(|draw| draw[1]).collect();
         let counts: Vec<[u32; KINDS]> = draws.chunks_exact(KINDS).map(|d| [d[0], d[1]]).collect();
         let list = words(tiles.list);
-        let [columns, rows] = tiles.levels[0];
-        let direct = list[..(columns * rows) as usize].iter().rev().take(counts[0][1] as usize);
+        let mut rest = &list[..];
+        let mut direct = Vec::new();
+        for ([columns, rows], count) in tiles.levels.iter().zip(&counts) {
+            let (level, others) = rest.split_at((columns * rows) as usize);
+            let last = level.iter().rev().take(count[1] as usize);
+            direct.push(last.map(|word| [word & 0xffff, word >> 16]).collect());
+            rest = others;
+        }
         Ok(Self {
-            direct: direct.map(|word| [word & 0xffff, word >> 16]).collect(),
+            direct,
             back: tiles.back.map_or(vec![], |back| {
                 let mut words = words(back).into_iter();
                 let has_back = |[x, y]: &[u32; 2]| {
