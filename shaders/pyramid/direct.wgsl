@@ -15,7 +15,10 @@
 @group(0) @binding(16) var back_lights: texture_2d<f32>;
 @group(0) @binding(17) var back_shapes: texture_2d<u32>;
 
-// Whether there is a layer behind.
+// As in pack_back.wgsl; looked at where there is a layer behind.
+@group(0) @binding(18) var<storage, read> back_tiles: array<u32>;
+
+// Whether it is over the tiles that have a layer behind within reach; else over those that have none.
 override BACK: bool = false;
 
 // Gaussians of a level that are summed as one.
@@ -241,6 +244,21 @@ fn gathered(pixel: vec2i, e: vec3f, shape: Shape) -> Gathered {
         g.weight += beyond;
     }
     return g;
+}
+
+@vertex
+fn vs_direct(
+    @builtin(vertex_index) vertex: u32,
+    @builtin(instance_index) instance: u32,
+) -> @builtin(position) vec4f {
+    let tile = tile_of(instance);
+    var has_back = false;
+    if view.back_reach > 0.0 {
+        let columns = (u32(level.size.x) + TILE - 1u) / TILE;
+        has_back = (back_tiles[tile.y * columns + tile.x] & 1u) != 0u;
+    }
+    // Nothing where it is not its kind.
+    return select(vec4f(0.0), on_screen(tile, vertex), has_back == BACK);
 }
 
 @fragment

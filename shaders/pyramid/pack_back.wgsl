@@ -30,9 +30,6 @@ fn pack_back(
             textureStore(packed_shape, pixel, vec4u(packed.shape, 0u, 0u));
             let is_near = thickness < view.back_reach && packed.shape.x >> 24u == seen.x >> 24u;
             atomicOr(&held, select(BACK_ANY, BACK_ANY | BACK_NEAR, is_near));
-        } else {
-            textureStore(packed_light, pixel, vec4f(0.0));
-            textureStore(packed_shape, pixel, vec4u(0u));
         }
     }
     workgroupBarrier();

@@ -1,14 +1,38 @@
 //! The layer behind the frame, as the pyramid has it. Drives `shaders/pyramid/pack_back.wgsl` and
 //! `halve_back.wgsl`.
 
+use glam::Vec3;
 use wgpu::{BindGroup, BindingResource, Buffer, BufferUsages, Device, Queue, TextureView};
 
 use super::passes::{Compute, LIGHT, SHAPE};
 use super::scratch::{self, Scratch, View};
+use crate::Profile;
 use crate::gpu::{self, Recorder};
 
-/// Three σ of a Gaussian: what lies further behind adds 1 % to its mass.
-pub(super) const REACH_SIGMAS: f32 = 3.0;
+/// How far behind a surface a layer may lie, in mm, for its light to change what is seen by an error, each as a part
+/// of white: Σ w e^(−t²/2v) at t.
+pub(super) fn reach_mm(profiles: &[Profile], error: f32) -> f32 {
+    let is_seen = |t: f32| {
+        let left = |profile: &Profile| {
+            let each = profile.gaussians().iter().filter(|g| g.variance_mm2 > 0.0);
+            each.map(|g| Vec3::from(g.weight) * (-0.5 * t * t / g.variance_mm2).exp()).sum::<Vec3>()
+        };
+        profiles.iter().any(|profile| left(profile).max_element() > error)
+    };
+    let gaussians = profiles.iter().flat_map(Profile::gaussians);
+    let widest_mm = gaussians.map(|g| g.variance_mm2).fold(0.0, f32::max).sqrt();
+    // Beyond 4 σ there are 3e-4 left.
+    let (mut near, mut far) = (0.0, 4.0 * widest_mm);
+    for _ in 0..16 {
+        let middle = 0.5 * (near + far);
+        if is_seen(middle) {
+            near = middle;
+        } else {
+            far = middle;
+        }
+    }
+    far
+}
 
 /// What one view needs for it.
 #[derive(Debug)]
@@ -37,7 +61,10 @@ pub(super) type Textures = [TextureView; 3];
 
 impl Back {
     pub(super) fn new(device: &Device, front: &Scratch) -> Self {
-        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::STORAGE_BINDING;
+        // Passes clear the finest level.
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::STORAGE_BINDING;
         let count = front.levels.len();
         let mips = |label, format| scratch::mips(device, label, front.size, count, format, usage);
         let lights = mips("subsurface::pyramid light of the back", LIGHT);
@@ -56,6 +83,11 @@ impl Back {
             lights: lights.create_view(&Default::default()),
             shapes: shapes.create_view(&Default::default()),
         }
+    }
+
+    /// Light and shape, as fine as the frame.
+    pub(super) fn finest(&self) -> &[TextureView; 2] {
+        &self.levels[0]
     }
 
     /// Uploads the numbers of a frame; `has_id`: whether the back has ids.

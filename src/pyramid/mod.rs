@@ -176,9 +176,6 @@ impl Pyramid {
             Some(_) => drop(view.back.get_or_insert_with(|| Back::new(device, &view.scratch))),
             None => view.back = None,
         }
-        let gaussians = profiles.iter().flat_map(Profile::gaussians);
-        let widest_mm2 = gaussians.map(|g| g.variance_mm2).fold(0.0, f32::max);
-        let back_reach = back::REACH_SIGMAS * widest_mm2.sqrt();
         let plan = &self.plan;
         let coarsest = plan.coarsest_level(optics.nearest_px_per_mm());
         let last = coarsest.max(1).min(view.scratch.levels.len() - 1);
@@ -199,7 +196,7 @@ impl Pyramid {
             frame_limit: FRAME_LIMIT.min(FRAME_LIMIT_ERRORS * plan.predicted_error()),
             level_limit: LEVEL_LIMIT,
             levels: last as u32,
-            back_reach: if frame.back.is_some() { back_reach } else { 0.0 },
+            back_reach: frame.back.map_or(0.0, |_| back::reach_mm(profiles, plan.predicted_error())),
         };
         queue.write_buffer(&view.scratch.view, 0, bytemuck::bytes_of(&numbers));
         let back_id = frame.back.and_then(|back| back.profile_id).or(frame.profile_id);
@@ -274,6 +271,8 @@ impl Pyramid {
                 resources.push((4, Texture(&read.strength)));
                 resources.push((5, Texture(&read.albedo)));
                 resources.push((6, Texture(&read.irradiance)));
+                let tiles = back.map_or(&scratch.contents, |back| &back.tiles);
+                resources.push((18, tiles.as_entire_binding()));
             }
             group(&pass.layout, &resources)
         };
@@ -381,7 +380,9 @@ impl Pyramid {
             encoder.clear_buffer(&back.tiles, 0, None);
         }
         // Nothing is drawn: it clears what is packed.
-        recorder.draw("subsurface::pyramid clear", &[&base.light, &base.shape], false);
+        let front = [&base.light, &base.shape];
+        let cleared: Vec<_> = front.into_iter().chain(back.iter().flat_map(Back::finest)).collect();
+        recorder.draw("subsurface::pyramid clear", &cleared, false);
         {
             let [x, y] = base.tiles;
             let mut pass = recorder.dispatch("subsurface::pyramid pack");
@@ -426,7 +427,8 @@ impl Pyramid {
     }
 }
 
-/// Draws the planar tiles of a level by the first, the others by the second.
+/// Draws the planar tiles of a level by the first, the others by the second; where there is a back layer within
+/// reach by that which knows it.
 fn over_tiles(
     pass: &mut wgpu::RenderPass,
     draws: &OverTiles,
@@ -437,8 +439,11 @@ fn over_tiles(
 ) {
     pass.set_bind_group(0, group, &[]);
     for (i, pipeline) in (CLASSES * l as u64..).zip(&draws.pipelines) {
-        let is_last = i + 1 == CLASSES * (l as u64 + 1);
-        pass.set_pipeline(draws.with_back.as_ref().filter(|_| is_last && has_back).unwrap_or(pipeline));
+        pass.set_pipeline(pipeline);
         pass.draw_indirect(&scratch.draws, i * DRAW_BYTES);
+    }
+    if let Some(with_back) = draws.with_back.as_ref().filter(|_| has_back) {
+        pass.set_pipeline(with_back);
+        pass.draw_indirect(&scratch.draws, (CLASSES * (l as u64 + 1) - 1) * DRAW_BYTES);
     }
 }

@@ -46,7 +46,7 @@ pub(super) struct Compute {
 pub(super) struct OverTiles {
     pub layout: BindGroupLayout,
     pub pipelines: Vec<RenderPipeline>,
-    /// Of the last class where there is a back layer; of the frame alone.
+    /// Of the tiles of the last class that have a back layer within reach; of the frame alone.
     pub with_back: Option<RenderPipeline>,
 }
 
@@ -136,7 +136,8 @@ impl Passes {
             (16, FLOATS),
             (17, UINTS),
         ];
-        let frame: Vec<_> = level.into_iter().chain([(4, FLOATS), (5, FLOATS), (6, FLOATS)]).collect();
+        let frame: Vec<_> =
+            level.into_iter().chain([(4, FLOATS), (5, FLOATS), (6, FLOATS), (18, READ)]).collect();
         let copy_label = "subsurface::pyramid fs_copy";
         let copy_layout = gpu::layout(
             device,
@@ -213,7 +214,7 @@ impl Passes {
             ),
             frame: over_tiles(
                 "fs_frame",
-                &[("vs_corner", PLANAR), ("vs_tile", DIRECT)],
+                &[("vs_corner", PLANAR), ("vs_direct", DIRECT)],
                 &frame,
                 &[],
                 Some(&plan.kernels.fine),

@@ -158,39 +158,42 @@ impl<'a> Seen<'a> {
         }
         uses.add(method, "pack", on, off / LEAVES_AT_ONCE, "guess", "");
         let threads = |l: usize| counted.levels[l][0] * counted.levels[l][1] * TILE * TILE;
-        let direct_pass = match counted.back[..] {
-            [] => format!("frame direct {error}"),
-            _ => format!("frame direct, two layers {error}"),
-        };
         for (l, tiles) in counted.back.iter().enumerate() {
             let pass = if l == 0 { "pack back" } else { "halve back" };
-            let on = tiles * TILE * TILE;
+            let on = tiles.iter().filter(|holds| **holds != 0).count() as u32 * TILE * TILE;
             uses.add(method, pass, on, threads(l) - on, "", "");
         }
         let tiles: u32 = counted.levels.iter().map(|[x, y]| x * y).sum();
         let listed: u32 = counted.tiles.iter().flatten().sum();
         uses.add(method, "list", listed, tiles - listed, "guess", "");
         let pixels = |level: usize, kind: usize| counted.tiles[level][kind] * TILE * TILE;
-        let [planar, direct] = [0, 1].map(|kind| pixels(0, kind));
+        let planar = pixels(0, 0);
         // Tiles do not say whether the square is summed in them: a share of the planar pixels, as the rows say.
         let square = (f64::from(planar) * self.share_with_square(plan)) as u32;
-        let trips =
-            |level: usize| self.trips(plan, level, &counted.direct[level]).map(|t| format!("{t:.2}"));
-        let of_frame = trips(0).join(" ");
-        for (pass, on, trips) in [
-            (format!("frame planar {error}"), planar - square, ""),
-            (format!("frame planar square {error}"), square, ""),
-            (direct_pass, direct, &*of_frame),
+        let trips = |level: usize, tiles: &[[u32; 2]]| {
+            self.trips(plan, level, tiles).map(|t| format!("{t:.2}")).to_vec()
+        };
+        let (thin, direct): (Vec<_>, Vec<_>) =
+            counted.direct[0].iter().partition(|tile| counted.has_back_near(**tile));
+        for (kind, on, tiles) in [
+            ("planar", planar - square, &[][..]),
+            ("planar square", square, &[]),
+            ("direct", direct.len() as u32 * TILE * TILE, &direct),
+            ("direct, two layers", thin.len() as u32 * TILE * TILE, &thin),
         ] {
             if on > 0 {
-                uses.add(method, &pass, on, 0, "tiles", trips);
+                let trips = if tiles.is_empty() { String::new() } else { trips(0, tiles).join(" ") };
+                uses.add(method, &format!("frame {kind} {error}"), on, 0, "tiles", &trips);
             }
         }
         for level in 1..counted.levels.len() {
             for (kind, on) in [("planar", pixels(level, 0)), ("direct", pixels(level, 1))] {
                 if on > 0 {
                     // A level sums its own Gaussians alone.
-                    let trips = if kind == "direct" { trips(level)[1..].join(" ") } else { String::new() };
+                    let trips = match kind {
+                        "direct" => trips(level, &counted.direct[level])[1..].join(" "),
+                        _ => String::new(),
+                    };
                     uses.add(method, &format!("down {kind}"), on, 0, "tiles", "");
                     uses.add(method, &format!("level {kind} {error}"), on, 0, "tiles", &trips);
                 }
@@ -378,8 +381,8 @@ struct Counted {
     levels: Vec<[u32; 2]>,
     /// The latter, of each level.
     direct: Vec<Vec<[u32; 2]>>,
-    /// Tiles of each level that have a back layer within reach; empty without one.
-    back: Vec<u32>,
+    /// What the tiles of each level hold of a back layer; empty without one.
+    back: Vec<Vec<u32>>,
 }
 
 impl Counted {
@@ -403,14 +406,19 @@ impl Counted {
             direct,
             back: tiles.back.map_or(vec![], |back| {
                 let mut words = words(back).into_iter();
-                let has_back = |[x, y]: &[u32; 2]| {
-                    words.by_ref().take((x * y) as usize).filter(|w| *w != 0).count() as u32
-                };
-                tiles.levels.iter().map(has_back).collect()
+                let of_level = |[x, y]: &[u32; 2]| words.by_ref().take((x * y) as usize).collect();
+                tiles.levels.iter().map(of_level).collect()
             }),
             tiles: counts,
             levels: tiles.levels,
         })
+    }
+}
+
+impl Counted {
+    /// Whether a tile of the frame is summed over two layers: `BACK_NEAR` of pack_back.wgsl.
+    fn has_back_near(&self, [x, y]: [u32; 2]) -> bool {
+        self.back.first().is_some_and(|tiles| tiles[(y * self.levels[0][0] + x) as usize] & 1 != 0)
     }
 }
 
