@@ -88,13 +88,13 @@ impl Optics {
         Vec4::new(m.z_axis.z, m.w_axis.z, m.z_axis.w, m.w_axis.w)
     }
 
-    /// The pixels to a mm of a surface that faces the camera at the near plane, along the axis that has fewer; endless
-    /// where that is not known.
-    pub(crate) fn nearest_px_per_mm(&self) -> f64 {
+    /// The pixels to a mm of a surface that faces the camera so near to it, or at the near plane, along the axis that
+    /// has fewer; endless where that is not known.
+    pub(crate) fn nearest_px_per_mm(&self, nearest_mm: Option<f32>) -> f64 {
         let [x, y, z, w] = self.depth_to_mm().to_array();
         let near = 1.0 - self.far;
         let s = self.spacing();
-        let z = (x * near + y) / (z * near + w);
+        let z = nearest_mm.map_or((x * near + y) / (z * near + w), |mm| -mm);
         let mm = (s.x + s.y * z).abs().max((s.z + s.w * z).abs());
         if mm > 0.0 { f64::from(mm).recip() } else { f64::INFINITY }
     }

@@ -109,7 +109,7 @@ impl AtlasView {
         let size = [texture.width(), texture.height()];
         validate::texture("irradiance", atlas.irradiance, Role::Color, size)?;
         validate::texture("positions", atlas.positions, Role::Positions, size)?;
-        validate::mm_per_unit(atlas.mm_per_unit)?;
+        validate::positive("mm_per_unit", atlas.mm_per_unit)?;
         let Shared { profiles, sum, .. } = &*effect.shared;
         // Scratch of another size goes before the new one comes.
         let kept = self.prepared.take().map(|(_, sums)| sums).filter(|sums| sums.size() == size);

@@ -65,7 +65,10 @@ pub(crate) fn frame(frame: &Frame, output: Output) -> Result<(), Error> {
     if !fits(x, width, size[0]) || !fits(y, height, size[1]) {
         return Err(Error::Viewport { got: frame.rectangle(), size });
     }
-    mm_per_unit(frame.mm_per_unit)
+    if let Some(nearest) = frame.nearest {
+        positive("nearest", nearest)?;
+    }
+    positive("mm_per_unit", frame.mm_per_unit)
 }
 
 /// Checks that `view` shows a single-sampled 2-D texture of this role and size that shaders can read.
@@ -134,12 +137,12 @@ pub(crate) fn profiles(profiles: &[Profile]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Checks the length of a scene unit.
-pub(crate) fn mm_per_unit(mm_per_unit: f32) -> Result<(), Error> {
-    if !mm_per_unit.is_finite() || mm_per_unit <= 0.0 {
+/// Checks a length.
+pub(crate) fn positive(input: &str, length: f32) -> Result<(), Error> {
+    if !length.is_finite() || length <= 0.0 {
         return Err(Error::Number {
-            input: "mm_per_unit".into(),
-            got: mm_per_unit.into(),
+            input: input.into(),
+            got: length.into(),
             needs: "a finite number above 0",
         });
     }

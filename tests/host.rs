@@ -315,6 +315,39 @@ fn views_share_a_submission() {
     }
 }
 
+/// Levels for skin that is nearer than any are left out, and nothing else changes.
+#[test]
+fn a_host_that_knows_its_nearest_skin_pays_for_fewer_levels() {
+    let gpu = gpu();
+    let scene = Scene::new();
+    let size = scene.size;
+    let irradiance = gpu.upload("irradiance", size, HALF, &halves(&scene.irradiance));
+    let depth = gpu.upload("depth", size, TextureFormat::R32Float, &scene.depth);
+    let to_view = scene.projection.inverse();
+    let distance = |d: &f32| -to_view.project_point3(glam::Vec3::new(0.0, 0.0, *d)).z;
+    let seen = scene.depth.iter().filter(|d| **d != 0.0);
+    let nearest = seen.map(distance).fold(f32::MAX, f32::min);
+    let effect = ScreenSpace::new(&gpu.device, HALF, plan(true)).unwrap();
+    let levels_and_picture = |nearest| {
+        let mut frame = Frame::new(&irradiance, &depth, scene.projection.to_cols_array_2d());
+        frame.mm_per_unit = 1.0;
+        frame.nearest = nearest;
+        let mut view = subsurface::View::new();
+        view.prepare(&gpu.device, &gpu.queue, &effect, &frame).unwrap();
+        let output = gpu.target("output", size, HALF);
+        gpu.run(|encoder| view.render(encoder, &output).unwrap());
+        (view.tiles().unwrap().levels.len(), gpu.read(&output))
+    };
+    let (all, whole) = levels_and_picture(None);
+    let (some, known) = levels_and_picture(Some(nearest));
+    let (fewest, wrong) = levels_and_picture(Some(100.0 * nearest));
+    println!("the frame and its levels: {all}, {some} for skin at {nearest} mm, {fewest} from far away");
+    assert!(fewest < some && some < all, "{fewest} {some} {all}");
+    assert_eq!(known, whole);
+    // As it says: it scatters too little.
+    assert!(wrong != whole && wrong.iter().flatten().all(|c| c.is_finite()));
+}
+
 /// Times of passes, where the device takes them.
 #[test]
 fn passes_tell_their_times() {

@@ -63,6 +63,7 @@ struct Inputs {
     viewport: Option<Viewport>,
     projection: Mat4,
     mm_per_unit: f32,
+    nearest: Option<f32>,
 }
 
 impl Inputs {
@@ -79,6 +80,7 @@ impl Inputs {
             viewport: None,
             projection: View::perspective(SIZE, 40.0).projection.as_mat4(),
             mm_per_unit: 1.0,
+            nearest: None,
         }
     }
 
@@ -96,6 +98,7 @@ impl Inputs {
         });
         frame.viewport = self.viewport;
         frame.mm_per_unit = self.mm_per_unit;
+        frame.nearest = self.nearest;
         frame
     }
 }
@@ -219,6 +222,8 @@ fn what_does_not_fit_is_named() {
         ("mm_per_unit", |i| i.mm_per_unit = 0.0),
         ("mm_per_unit", |i| i.mm_per_unit = -1.0),
         ("mm_per_unit", |i| i.mm_per_unit = f32::NAN),
+        ("nearest", |i| i.nearest = Some(0.0)),
+        ("nearest", |i| i.nearest = Some(f32::INFINITY)),
     ];
     for (name, change) in table {
         assert_names(&screen(change).expect_err(name), name);

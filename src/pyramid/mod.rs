@@ -91,7 +91,7 @@ pub struct Tiles<'a> {
     pub list: &'a Buffer,
     /// A word a tile, levels in the same order: not 0 where there is a back layer within reach. `COPY_SRC`.
     pub back: Option<&'a Buffer>,
-    /// Columns and rows of tiles of each level.
+    /// Columns and rows of tiles of each level that is drawn.
     pub levels: Vec<[u32; 2]>,
 }
 
@@ -177,7 +177,8 @@ impl Pyramid {
             None => view.back = None,
         }
         let plan = &self.plan;
-        let coarsest = plan.coarsest_level(optics.nearest_px_per_mm());
+        let nearest_mm = frame.nearest.map(|nearest| nearest * frame.mm_per_unit);
+        let coarsest = plan.coarsest_level(optics.nearest_px_per_mm(nearest_mm));
         let last = coarsest.max(1).min(view.scratch.levels.len() - 1);
         let numbers = scratch::View {
             has_id: u32::from(frame.profile_id.is_some()),
@@ -357,11 +358,12 @@ impl Pyramid {
 
     pub(crate) fn tiles(view: &PyramidView) -> Tiles<'_> {
         let scratch = &view.scratch;
+        let last = view.groups.as_ref().map_or(0, |groups| groups.last);
         Tiles {
             draws: &scratch.draws,
             list: &scratch.list,
             back: view.back.as_ref().map(|back| &back.tiles),
-            levels: scratch.levels.iter().map(|level| level.tiles).collect(),
+            levels: scratch.levels[..=last].iter().map(|level| level.tiles).collect(),
         }
     }
 
