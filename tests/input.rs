@@ -185,7 +185,7 @@ fn assert_names(error: &Error, name: &str) {
 fn what_does_not_fit_is_named() {
     use TextureFormat as F;
     type Change = fn(&mut Inputs);
-    let table: [(&str, Change); 25] = [
+    let table: [(&str, Change); 27] = [
         ("irradiance: format", |i| i.irradiance = view(F::Rgba8Uint)),
         ("irradiance: format", |i| i.irradiance = view(F::R16Float)),
         ("depth: format", |i| i.depth = view(F::Rgba16Float)),
