@@ -1,6 +1,6 @@
 //! The plan: what work keeps a stated error.
 //!
-//! A host needs [`Plan`] alone. The rest is for tools that show what a plan does.
+//! A host needs [`Plan`] alone.
 
 mod edge_response;
 mod fit;
@@ -42,7 +42,7 @@ const EXACT_ERROR: f32 = 0.0005;
 /// fitted so that the largest error on straight edges is the least, along the axes of the pixels, at 45° and
 /// at 27°:
 /// edges soft by σ = 1 px against the closed form, hard ones against the visible integral. It holds up
-/// to the px/mm of the last of [`rows`](Self::rows), where a profile is as wide as the last level;
+/// to the last of [`useful_px_per_mm`](Self::useful_px_per_mm), where a profile is as wide as the last level;
 /// beyond, blurs stay as wide as there. Layers, and detail of a pixel on steep slopes, may be off by
 /// more (docs/method.md).
 #[derive(Clone, Debug, PartialEq)]
@@ -58,6 +58,7 @@ pub struct Plan {
 /// What is done at one scale; between two rows weights are interpolated, linearly in log₂ of the px/mm.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
+#[doc(hidden)] // of use to the lab alone, as what is made of it below
 pub struct Row {
     /// Pixels per mm along the direction in which a surface is foreshortened most.
     pub px_per_mm: f32,
@@ -180,6 +181,7 @@ impl Plan {
 }
 
 /// What it does at each scale, for tools that show it.
+#[doc(hidden)] // of use to the lab alone
 impl Plan {
     /// The rows of a profile, counted from 0, from the smallest scale to the largest; none of one
     /// that the plan was not made for, or of the exact effect.
@@ -200,14 +202,6 @@ impl Plan {
         let weights = self.weights()?;
         let rows = weights.profiles.get(profile)?;
         (px_per_mm > 0.0).then(|| weights.fetches(rows, px_per_mm))
-    }
-
-    /// Which of [`rows`](Self::rows) tells a tile of skin up to which level it is blurred, by the most
-    /// px/mm that any pixel of its 8×8 has, as if it faced the camera. It is beyond those that weigh the
-    /// blurs there by two to three rows. None for the exact effect, which has no levels.
-    pub fn tile_row(&self, px_per_mm: f32) -> Option<usize> {
-        let weights = self.weights()?;
-        (px_per_mm > 0.0).then(|| weights.tile_row(px_per_mm))
     }
 }
 

@@ -10,9 +10,6 @@ use super::kernels::Kernels;
 /// Rows to an octave of scale; between two of them weights are interpolated.
 pub(crate) const ROWS_PER_OCTAVE: f64 = 6.0;
 
-/// How many rows a tile looks beyond that of its scale, rounded up; as in pack.wgsl.
-const ROWS_BEYOND: f32 = 2.0;
-
 /// Levels that weights may be for.
 pub(crate) const MAX_LEVELS: usize = 10;
 
@@ -150,13 +147,6 @@ impl Weights {
             sum += (blurred + halved) as f32 * f32::powi(0.25, l as i32);
         }
         sum
-    }
-
-    /// The row that pack.wgsl asks for the level of a tile.
-    pub(crate) fn tile_row(&self, px_per_mm: f32) -> usize {
-        let rows = (px_per_mm.log2() - self.first_octave()) * ROWS_PER_OCTAVE as f32;
-        let row = rows.ceil() + ROWS_BEYOND;
-        row.clamp(0.0, (self.row_count() - 1) as f32) as usize
     }
 
     /// The largest error on straight edges, of any profile at any scale.

@@ -3,20 +3,19 @@
 use egui::{Align2, Color32, FontId, Painter, Pos2, Rect, Vec2};
 use subsurface::Profile;
 
-use crate::level::Key;
 use crate::width;
 
 /// Of false colours.
 pub enum Legend {
     /// Pixels at the ends of the colours.
     Width([f32; 2]),
-    Levels(Vec<Key>),
+    /// As `Overlay` draws them.
+    Levels,
 }
 
 /// In points.
 pub const WIDTH: f32 = 270.0;
 const BAR: f32 = 12.0;
-const LINE: f32 = 18.0;
 
 /// Draws a legend from a lower left corner upwards.
 pub fn show(painter: &Painter, corner: Pos2, legend: &Legend, profile: &Profile, half_resolution: bool) {
@@ -40,24 +39,10 @@ pub fn show(painter: &Painter, corner: Pos2, legend: &Legend, profile: &Profile,
                 label(painter, at(place * WIDTH, 20.0), anchor, &text, WIDTH);
             }
         }
-        Legend::Levels(keys) => {
-            for (i, key) in keys.iter().enumerate() {
-                let up = 20.0 + LINE * i as f32;
-                bar(painter, at(0.0, up + BAR + 1.0), 60.0, key.colors.iter().copied());
-                let [first, last] = key.px_per_mm;
-                let rows = match key.colors.len() {
-                    1 => format!("row of {first:.2} px/mm"),
-                    count => format!("{count} rows, {first:.2} to {last:.2} px/mm"),
-                };
-                let text = match key.level {
-                    0 => format!("the frame alone: {rows}"),
-                    level => format!("level {level}: {rows}"),
-                };
-                label(painter, at(66.0, up - 3.0), Align2::LEFT_BOTTOM, &text, WIDTH);
-            }
-            let text = "coarsest level that a tile of 8×8 is blurred at, by row of the plan";
-            let up = 20.0 + LINE * keys.len() as f32;
-            label(painter, at(0.0, up), Align2::LEFT_BOTTOM, text, WIDTH);
+        Legend::Levels => {
+            let text = "coarsest level that a pixel is blurred at, from dark blue, the frame itself, \
+                to red, level 8";
+            label(painter, at(0.0, 0.0), Align2::LEFT_BOTTOM, text, WIDTH);
         }
     }
 }

@@ -7,7 +7,6 @@
 mod divider;
 mod layer;
 mod legend;
-mod level;
 mod options;
 mod panel;
 mod passes;

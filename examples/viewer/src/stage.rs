@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use image::RgbImage;
 use subsurface::wgpu::TextureView;
-use subsurface::{Atlas, Plan, Profile, ScreenSpace};
+use subsurface::{Atlas, Overlay, Plan, Profile, ScreenSpace, Show};
 use subsurface_lab::Error;
 use subsurface_lab::method::{Ours, OursUnrolled};
 use subsurface_lab::metrics;
@@ -22,7 +22,7 @@ use subsurface_lab::renderer::{
 use crate::layer::Layer;
 use crate::legend::Legend;
 use crate::passes::Pass;
-use crate::{level, passes, width};
+use crate::{passes, width};
 
 /// While the view moves, effects that took longer wait until it rests.
 const PATIENCE_MS: f64 = 400.0;
@@ -169,6 +169,7 @@ struct Effects {
     timestamps: Option<Timestamps>,
     screen: HashMap<Layer, Ours>,
     texture: Option<(Profile, OursUnrolled)>,
+    overlay: Option<Overlay>,
     /// What each took last.
     last_ms: HashMap<Layer, f64>,
 }
@@ -257,7 +258,7 @@ impl Set {
             *view = View::new(stage, &self.renderer, look)?;
         }
         if view.has_back != look.has_back {
-            view.shots.retain(|layer, _| !matches!(layer, Layer::Screen | Layer::Exact));
+            view.shots.retain(|layer, _| !matches!(layer, Layer::Screen | Layer::Exact | Layer::Level));
             view.errors.clear();
             view.has_back = look.has_back;
             if look.has_back {
@@ -289,7 +290,9 @@ impl Set {
         look: &Look,
         layer: Layer,
     ) -> Result<Arc<Picture>, Error> {
-        let last_ms = effects.last_ms.get(&layer).copied().unwrap_or(0.0);
+        // Levels are drawn over what the plan scatters.
+        let effect = if layer == Layer::Level { Layer::Screen } else { layer };
+        let last_ms = effects.last_ms.get(&effect).copied().unwrap_or(0.0);
         let is_known = self.view.shots.contains_key(&layer);
         let is_planned = matches!(layer, Layer::Screen | Layer::Level);
         let why = if is_planned && look.plan.is_none() {
@@ -323,7 +326,8 @@ impl Set {
             return Ok(shot.clone());
         }
         let shot = match layer {
-            Layer::Width | Layer::Level => self.false_colors(stage, look, layer)?,
+            Layer::Width => self.width(stage, look)?,
+            Layer::Level => self.level(stage, effects, look)?,
             _ => self.scatter(stage, effects, look, layer)?,
         };
         self.view.shots.insert(layer, shot.clone());
@@ -344,12 +348,7 @@ impl Set {
         let since = Instant::now();
         let pixels = self.renderer.compose(&stage.gpu, &irradiance, Shown::Picture, 1.0);
         self.view.compose_ms = Some(ms(since));
-        Ok(Shot {
-            picture: Arc::new(Picture { title, image: image(self.size, pixels)?, legend: None }),
-            irradiance: Some(irradiance),
-            time,
-            passes: None,
-        })
+        Ok(Shot { irradiance: Some(irradiance), time, ..self.drawn(title, pixels, None)? })
     }
 
     /// Runs the effects that are shown once more, and has the device time their passes.
@@ -440,28 +439,42 @@ impl Set {
         Ok(Scattered { title, irradiance: output.clone(), taken_ms: Some(ms(since)) })
     }
 
-    fn false_colors(&self, stage: &Stage, look: &Look, layer: Layer) -> Result<Shot, Error> {
+    fn width(&self, stage: &Stage, look: &Look) -> Result<Shot, Error> {
         let depth = &self.renderer.gbuffer.depth;
         let depth: Vec<f32> = bytemuck::pod_collect_to_vec(&stage.gpu.read_bytes(depth.texture()));
         let skin = self.skin(stage);
-        let in_pixels = |length_mm| {
-            let (camera, unit) = (&look.camera, stage.mm_per_unit);
-            width::in_pixels(length_mm, &depth, &skin, camera, self.size, unit)
+        let widest_mm = width::widest_mm(&look.profile);
+        let widths = width::in_pixels(widest_mm, &depth, &skin, &look.camera, self.size, stage.mm_per_unit);
+        let range = width::range(&widths);
+        let pixels = width::picture(&widths, range);
+        self.drawn(Layer::Width.title().to_owned(), pixels, range.map(Legend::Width))
+    }
+
+    /// What the library shows of the plan's levels, over the picture.
+    fn level(&mut self, stage: &Stage, effects: &mut Effects, look: &Look) -> Result<Shot, Error> {
+        let shot = self.shot(stage, effects, look, Layer::Screen)?;
+        let gpu = &stage.gpu;
+        let target = self.renderer.picture_target(gpu);
+        if let Some(light) = &shot.irradiance {
+            let columns = 0..self.size[0];
+            self.renderer.draw_picture(gpu, light, Shown::Picture, 1.0, columns, &target);
+        }
+        let overlay = match effects.overlay.take() {
+            Some(overlay) => overlay,
+            None => Overlay::new(&gpu.device, target.texture().format())?,
         };
-        let mut title = layer.title().to_owned();
-        let (pixels, legend) = match (layer, &look.plan) {
-            (Layer::Level, Some(plan)) => {
-                title = format!("{title} at {:.4}", plan.max_error());
-                let rows = level::rows(plan, &in_pixels(1.0), self.size[0]);
-                let (pixels, keys) = level::picture(plan, &rows);
-                (pixels, Some(Legend::Levels(keys)))
-            }
-            _ => {
-                let widths = in_pixels(width::widest_mm(&look.profile));
-                let range = width::range(&widths);
-                (width::picture(&widths, range), range.map(Legend::Width))
-            }
-        };
+        let overlay = effects.overlay.insert(overlay);
+        if let Some(Ours { view, .. }) = effects.screen.get(&Layer::Screen) {
+            gpu.run(|encoder| overlay.render(&gpu.device, encoder, view, Show::Level, &target))?;
+        }
+        let pixels = gpu.read_bytes(target.texture());
+        let pixels = pixels.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
+        let error = look.plan.as_ref().map_or(0.0, |plan| plan.max_error());
+        let title = format!("{} at {error:.4}", Layer::Level.title());
+        self.drawn(title, pixels, Some(Legend::Levels))
+    }
+
+    fn drawn(&self, title: String, pixels: Vec<[u8; 3]>, legend: Option<Legend>) -> Result<Shot, Error> {
         Ok(Shot {
             picture: Arc::new(Picture { title, image: image(self.size, pixels)?, legend }),
             irradiance: None,
