@@ -40,7 +40,7 @@ pub struct Frame<'a> {
     pub nearest: Option<f32>,
     /// Which of the plan's profiles a pixel scatters by, counted from 1; 0 where nothing scatters. One
     /// unsigned integer channel, such as R8Uint. Default, `None`: all that is nearer than the far plane
-    /// scatters by the first.
+    /// scatters by the first. Ids of equal profiles are one: light crosses from the one to the other.
     pub profile_id: Option<&'a TextureView>,
     /// The share of its scattered light that a pixel takes, 0 to 1, in the first of one or more float
     /// channels, such as R8Unorm: less on lips, on brows and where hair begins. Its own light scatters to

@@ -164,15 +164,19 @@ fn no_scattering_leaks_onto_another_profile() {
 #[test]
 fn ids_of_equal_profiles_are_one() {
     let ball = sphere(9.0, 60.0, |n| DVec3::splat(n.x.max(0.0)));
-    let plan = Plan::new(&[Profile::SKIN; 3], 0.01).unwrap();
-    let by = |ids: fn(DVec3) -> u32| {
-        let g = View::perspective([128, 96], 40.0)
-            .shoot(|origin, ray| ball(origin, ray).map(|hit| Hit { id: ids(hit.point), ..hit }));
-        g.scatter_planned(&plan)
-    };
-    let one = by(|_| 1);
-    assert_eq!(one, by(|_| 3));
-    assert_eq!(one, by(|p| if p.x < 0.5 { 2 } else { 3 }));
+    let profiles = [Profile::SKIN; 3];
+    for plan in [Plan::new(&profiles, 0.01).unwrap(), Plan::exact(&profiles).unwrap()] {
+        let by = |ids: fn(DVec3) -> u32| {
+            let g = View::perspective([128, 96], 40.0)
+                .shoot(|origin, ray| ball(origin, ray).map(|hit| Hit { id: ids(hit.point), ..hit }));
+            g.scatter_planned(&plan)
+        };
+        let one = by(|_| 1);
+        assert_eq!(one, by(|_| 3));
+        assert_eq!(one, by(|p| if p.x < 0.5 { 2 } else { 3 }));
+        // An id without a profile is no skin still.
+        assert_ne!(one, by(|p| if p.x < 0.5 { 2 } else { 4 }));
+    }
 }
 
 #[test]

@@ -12,7 +12,12 @@ struct Settings {
     far: f32,
     // 0: all of the surface is of the first profile.
     has_id: u32,
+    // Of id i the component i − 1, four to a vector: the first id of an equal profile, so that light crosses from
+    // the one to the other; 0 where there is no profile.
+    ids: array<vec4u, 4>,
 }
+
+const MAX_PROFILES = 16u;
 
 @group(0) @binding(0) var<uniform> settings: Settings;
 @group(0) @binding(1) var depth: texture_2d<f32>;
@@ -24,7 +29,7 @@ fn vs_main(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
     return vec4f(uv * 2.0 - 1.0, 0.0, 1.0);
 }
 
-// Position in mm, and the profile id; zero where nothing scatters.
+// Position in mm, and the first id of the profile; zero where nothing scatters.
 @fragment
 fn fs_positions(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let pixel = vec2i(at.xy) + vec2i(settings.first_pixel);
@@ -33,7 +38,11 @@ fn fs_positions(@builtin(position) at: vec4f) -> @location(0) vec4f {
         id = textureLoad(profile_id, pixel, 0).r;
     }
     let d = textureLoad(depth, pixel, 0).r;
-    if id == 0u || d == settings.far {
+    if id == 0u || id > MAX_PROFILES || d == settings.far {
+        return vec4f(0.0);
+    }
+    id = settings.ids[(id - 1u) / 4u][(id - 1u) % 4u];
+    if id == 0u {
         return vec4f(0.0);
     }
     let uv = at.xy / settings.size;

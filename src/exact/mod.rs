@@ -12,7 +12,7 @@ use wgpu::{
 
 use crate::gpu::{self, Recorder};
 use crate::optics::Optics;
-use crate::{Frame, Output, Profile};
+use crate::{Frame, MAX_PROFILES, Output, Profile};
 use gaussian_sum::{GaussianSum, Inputs, SCRATCH, Sums, Textures};
 
 /// Bytes of positions, and of what [`GaussianSum`] takes: source, rows and two sums.
@@ -39,6 +39,17 @@ struct Settings {
     far: f32,
     has_id: u32,
     pad: [u32; 2],
+    ids: [u32; MAX_PROFILES],
+}
+
+/// Of each id, counted from 1, the first one of an equal profile; 0 of those that have none.
+fn first_equal_ids(profiles: &[Profile]) -> [u32; MAX_PROFILES] {
+    let mut ids = [0; MAX_PROFILES];
+    for (id, profile) in ids.iter_mut().zip(profiles) {
+        let first = profiles.iter().zip(1..).find(|(p, _)| p.gaussians() == profile.gaussians());
+        *id = first.map_or(0, |(_, first)| first);
+    }
+    ids
 }
 
 /// The passes.
@@ -127,13 +138,22 @@ impl Exact {
             back: None,
             sums: self.sum.sums(device, size),
         });
+        let numbers = Settings {
+            inverse_projection: optics.inverse_projection,
+            first_pixel: frame.rectangle().first(),
+            size: UVec2::from(size).as_vec2(),
+            far: optics.far,
+            has_id: 0,
+            pad: [0; 2],
+            ids: first_equal_ids(profiles),
+        };
         let front = (frame.depth, frame.profile_id);
-        self.prepare_surface(device, queue, &mut view.front, frame, optics, front);
+        self.prepare_surface(device, queue, &mut view.front, numbers, front);
         match frame.back {
             Some(back) => {
                 let surface = view.back.get_or_insert_with(|| Surface::new(device, size));
                 let layer = (back.depth, back.profile_id.or(frame.profile_id));
-                self.prepare_surface(device, queue, surface, frame, optics, layer);
+                self.prepare_surface(device, queue, surface, numbers, layer);
             }
             None => view.back = None,
         }
@@ -162,19 +182,11 @@ impl Exact {
         device: &Device,
         queue: &Queue,
         surface: &mut Surface,
-        frame: &Frame,
-        optics: &Optics,
+        numbers: Settings,
         layer: (&TextureView, Option<&TextureView>),
     ) {
         let (depth, profile_id) = layer;
-        let settings = Settings {
-            inverse_projection: optics.inverse_projection,
-            first_pixel: frame.rectangle().first(),
-            size: UVec2::from(frame.rectangle().size()).as_vec2(),
-            far: optics.far,
-            has_id: u32::from(profile_id.is_some()),
-            pad: [0; 2],
-        };
+        let settings = Settings { has_id: u32::from(profile_id.is_some()), ..numbers };
         queue.write_buffer(&surface.settings, 0, bytemuck::bytes_of(&settings));
         let profile_id = profile_id.unwrap_or(&self.no_id);
         let is_bound = |b: &Bound| b.depth == *depth && b.profile_id == *profile_id;
@@ -215,6 +227,11 @@ mod tests {
 
     #[test]
     fn settings_lie_as_the_shader_has_them() {
-        assert_layout!(SHADER, "Settings", Settings { inverse_projection, first_pixel, size, far, has_id });
+        assert_layout!(
+            SHADER,
+            "Settings",
+            Settings { inverse_projection, first_pixel, size, far, has_id, ids }
+        );
+        assert_eq!(crate::wgsl::constant(SHADER, "MAX_PROFILES") as usize, MAX_PROFILES);
     }
 }
