@@ -4,6 +4,8 @@
 #[cfg(feature = "programs")]
 pub mod chart;
 #[cfg(feature = "programs")]
+pub mod cli;
+#[cfg(feature = "programs")]
 pub mod compare;
 #[cfg(feature = "programs")]
 pub mod damage;

@@ -18,6 +18,7 @@ use subsurface::Plan;
 use subsurface::wgpu::TextureFormat;
 
 use crate::chart::plot::panel::{DIM, LEGEND, SMALL, TITLE};
+use crate::cli::{self, Arguments};
 use crate::method::{self, Ours};
 use crate::renderer::{BrdfTables, Camera, Environment, Gpu, Layer, Lighting, Renderer, Scene, Specular};
 use crate::svg::{Point, Rasteriser, Stroke, Svg, Type};
@@ -43,39 +44,20 @@ const SPHERE: u32 = 368;
 const F0: f32 = 0.028;
 
 pub fn main() -> ExitCode {
-    match options().and_then(|options| options.map_or(Ok(()), |(slope, out)| compare(slope, &out))) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    cli::main(HELP, options, |(slope, out)| compare(slope, &out))
 }
 
-/// The slope and where to write to; `None` when help was asked for.
-fn options() -> Result<Option<(f32, PathBuf)>, Error> {
-    use lexopt::prelude::*;
-
+/// The slope and where to write to.
+fn options(arguments: &mut Arguments) -> Result<(f32, PathBuf), Error> {
     let (mut slope, mut out) = (0.3, PathBuf::from("out/specular"));
-    let refused =
-        |e: lexopt::Error| Error::new("command line", format!("\"{e}\""), "options as --help lists them");
-    let mut parser = lexopt::Parser::from_env();
-    while let Some(arg) = parser.next().map_err(refused)? {
-        match arg {
-            Short('h') | Long("help") => {
-                print!("{HELP}");
-                return Ok(None);
-            }
-            Long("slope") => {
-                let text = parser.value().and_then(|v| v.string()).map_err(refused)?;
-                let number = text.parse().ok().filter(|x| (0.05..=1.0).contains(x));
-                slope = number.ok_or_else(|| Error::new("--slope", text, "0.05 to 1"))?;
-            }
-            Long("out") => out = parser.value().map_err(refused)?.into(),
-            other => return Err(refused(other.unexpected())),
+    while let Some(name) = arguments.next()? {
+        match name.as_str() {
+            "--slope" => slope = arguments.number("0.05 to 1", |x| (0.05..=1.0).contains(x))?,
+            "--out" => out = arguments.value()?.into(),
+            _ => return Err(arguments.unknown()),
         }
     }
-    Ok(Some((slope, out)))
+    Ok((slope, out))
 }
 
 /// What is known of a model.

@@ -23,8 +23,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use subsurface::wgpu::Features;
-use subsurface_lab::Error;
 use subsurface_lab::renderer::{Camera, Gpu, Scene, View};
+use subsurface_lab::{Error, cli};
 use winit::application::ApplicationHandler;
 use winit::event::{StartCause, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
@@ -38,13 +38,7 @@ use viewer::Viewer;
 use window::Window;
 
 fn main() -> ExitCode {
-    match Options::parse().and_then(|options| options.map_or(Ok(()), view)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    cli::main(options::HELP, Options::parse, view)
 }
 
 /// What other threads hand to the window's.

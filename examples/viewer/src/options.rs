@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use subsurface_lab::Error;
+use subsurface_lab::cli::Arguments;
 use subsurface_lab::renderer::Environment;
 
-const HELP: &str = "\
+pub const HELP: &str = "\
 A head in a window: scattered by each mode, or by two of them on the sides of a divider.
 
 Usage: cargo run --release -p subsurface-viewer -- [OPTIONS] [FILE]
@@ -46,10 +47,9 @@ pub struct Options {
 }
 
 impl Options {
-    /// The command line; `None` when it asked for help.
-    pub fn parse() -> Result<Option<Self>, Error> {
-        use lexopt::prelude::*;
-
+    /// # Errors
+    /// An option that is not known, or a value that does not fit.
+    pub fn parse(arguments: &mut Arguments) -> Result<Self, Error> {
         let mut options = Self {
             model: None,
             mm_per_unit: 1000.0,
@@ -58,76 +58,23 @@ impl Options {
             environment: None,
             out: "out/viewer".into(),
         };
-        let refused = |e: lexopt::Error| {
-            let got = format!("\"{e}\"");
-            Error::new("command line", got, "options as --help lists them")
-        };
-        let mut parser = lexopt::Parser::from_env();
-        while let Some(arg) = parser.next().map_err(refused)? {
-            let name = match arg {
-                Long(name) => name.to_string(),
-                Short('h') => "help".into(),
-                Value(file) if options.model.is_none() => {
-                    options.model = Some(file.into());
-                    continue;
-                }
-                other => return Err(refused(other.unexpected())),
-            };
-            let mut text = || parser.value().and_then(|v| v.string()).map_err(refused);
+        while let Some(name) = arguments.next()? {
             match name.as_str() {
-                "help" => {
-                    print!("{HELP}");
-                    return Ok(None);
+                "--mm-per-unit" => options.mm_per_unit = arguments.positive()?,
+                "--size" => {
+                    let fits = |side| (64..=8192).contains(&side);
+                    options.size = arguments.size(", from 64x64 to 8192x8192", fits)?;
                 }
-                "mm-per-unit" => options.mm_per_unit = mm_per_unit(&text()?)?,
-                "size" => options.size = size(&text()?)?,
-                "texture-size" => options.texture_size = texture_size(&text()?)?,
-                "environment" => options.environment = Some(Environment::named(&text()?)?),
-                "out" => options.out = text()?.into(),
-                _ => return Err(refused(Long(name.as_str()).unexpected())),
+                "--texture-size" => {
+                    let needs = "a number of texels, 16 to 8192";
+                    options.texture_size = arguments.number(needs, |n| (16..=8192).contains(n))?;
+                }
+                "--environment" => options.environment = Some(Environment::named(&arguments.value()?)?),
+                "--out" => options.out = arguments.value()?.into(),
+                _ if options.model.is_none() && !name.starts_with('-') => options.model = Some(name.into()),
+                _ => return Err(arguments.unknown()),
             }
         }
-        Ok(Some(options))
-    }
-}
-
-fn mm_per_unit(text: &str) -> Result<f32, Error> {
-    text.parse()
-        .ok()
-        .filter(|x: &f32| x.is_finite() && *x > 0.0)
-        .ok_or_else(|| Error::new("--mm-per-unit", text, "a number above 0"))
-}
-
-fn size(text: &str) -> Result<[u32; 2], Error> {
-    let needs = "WIDTHxHEIGHT in pixels, such as 1280x800, from 64x64 to 8192x8192";
-    text.split_once('x')
-        .and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]))
-        .filter(|size: &[u32; 2]| size.iter().all(|s| (64..=8192).contains(s)))
-        .ok_or_else(|| Error::new("--size", text, needs))
-}
-
-fn texture_size(text: &str) -> Result<u32, Error> {
-    text.parse()
-        .ok()
-        .filter(|n| (16..=8192).contains(n))
-        .ok_or_else(|| Error::new("--texture-size", text, "a number of texels, 16 to 8192"))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_checked() {
-        assert_eq!(size("640x480"), Ok([640, 480]));
-        for bad in ["640", "0x480", "640x-1", "9000x9000", "axb"] {
-            assert!(size(bad).is_err(), "{bad}");
-        }
-        assert_eq!(mm_per_unit("10"), Ok(10.0));
-        for bad in ["0", "-1", "NaN", "inf", ""] {
-            assert!(mm_per_unit(bad).is_err(), "{bad}");
-        }
-        assert_eq!(texture_size("512"), Ok(512));
-        assert!(texture_size("0").is_err());
+        Ok(options)
     }
 }

@@ -7,6 +7,7 @@ use subsurface::wgpu::TextureView;
 
 use crate::Error;
 use crate::method::ScreenMethod;
+use crate::metrics;
 use crate::renderer::{Gpu, Timestamps};
 
 /// On a GPU a method takes less than its submission; it is repeated within one until that lasts so long.
@@ -136,7 +137,11 @@ pub fn host_cost(
         drop(commands);
         gpu.run(|_| ());
     }
-    Ok(HostCost { prepare_us: median(&prepare), render_us: median(&render), upload_bytes })
+    Ok(HostCost {
+        prepare_us: metrics::median(&prepare),
+        render_us: metrics::median(&render),
+        upload_bytes,
+    })
 }
 
 /// Rounds that a method takes part in.
@@ -186,17 +191,6 @@ pub fn rounds(
     Ok(times)
 }
 
-pub fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let middle = sorted.len() / 2;
-    match sorted.len() % 2 {
-        _ if sorted.is_empty() => f64::NAN,
-        0 => (sorted[middle - 1] + sorted[middle]) / 2.0,
-        _ => sorted[middle],
-    }
-}
-
 /// Median of the ratios within rounds, and the interval that holds 95 % of the medians of as many
 /// rounds drawn with repetition.
 pub fn ratio(times: &[f64], base: &[f64]) -> (f64, [f64; 2]) {
@@ -213,11 +207,12 @@ pub fn ratio(times: &[f64], base: &[f64]) -> (f64, [f64; 2]) {
         state ^= state << 17;
         ratios[(state % ratios.len() as u64) as usize]
     };
-    let mut medians: Vec<f64> =
-        (0..DRAWS).map(|_| median(&(0..ratios.len()).map(|_| draw()).collect::<Vec<_>>())).collect();
+    let mut medians: Vec<f64> = (0..DRAWS)
+        .map(|_| metrics::median(&(0..ratios.len()).map(|_| draw()).collect::<Vec<_>>()))
+        .collect();
     medians.sort_unstable_by(f64::total_cmp);
     let interval = [0.025, 0.975].map(|share| medians[(share * DRAWS as f64) as usize]);
-    (median(&ratios), interval)
+    (metrics::median(&ratios), interval)
 }
 
 #[cfg(test)]
@@ -269,13 +264,6 @@ mod tests {
             // A megabyte is cleared in well under that, by a busy machine, too.
             assert!(repeats > 1 && ms > 0.0 && ms < 5.0, "{repeats}, {ms}");
         }
-    }
-
-    #[test]
-    fn medians_are_in_the_middle() {
-        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
-        assert!(median(&[]).is_nan());
     }
 
     #[test]

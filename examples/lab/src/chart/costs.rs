@@ -5,6 +5,7 @@ use glam::DVec2;
 
 use crate::chart::clock;
 use crate::chart::scene::{Scene, flat};
+use crate::metrics;
 use crate::renderer::{Camera, Gpu, Scene as Model, View};
 
 /// The frames that methods are timed on, in the order of [`scenes`].
@@ -40,7 +41,7 @@ pub fn note(name: &str, times: [&[f64]; 4], copy: &[f64], scenes: &[Scene; 4]) -
         let rounds = times[i].iter().zip(empty);
         rounds.map(|(t, e)| 1e6 * (t - e) / pixels).collect()
     });
-    let ns = |times: &[f64]| format!("{:.0} ns", clock::median(times));
+    let ns = |times: &[f64]| format!("{:.0} ns", metrics::median(times));
     let ratio = |times: &[f64], base: &[f64]| {
         let (ratio, [low, high]) = clock::ratio(times, base);
         format!("{ratio:.2} ({low:.2} to {high:.2})")

@@ -5,11 +5,12 @@ use std::time::Instant;
 use crate::Error;
 use subsurface::wgpu::TextureView;
 
-use crate::chart::clock::{self, Clock};
+use crate::chart::clock::Clock;
 use crate::chart::options::Plan;
 use crate::chart::plot::Series;
 use crate::chart::scene::{Scene, Surface};
 use crate::method::{AtlasMethod, ScreenMethod};
+use crate::metrics;
 use crate::renderer::{AtlasRenderer, Camera, Gpu, Renderer, Scene as Model, View};
 
 /// Numbers of heads, and the columns in which they stand.
@@ -120,7 +121,7 @@ fn median_ms(plan: &Plan, mut run: impl FnMut() -> Result<f64, Error>) -> Result
     {
         times.push(run()?);
     }
-    Ok(clock::median(&times))
+    Ok(metrics::median(&times))
 }
 
 /// Heads in rows and columns, across a frame of as many pixels as `size` has.

@@ -21,6 +21,7 @@ use crate::chart::score::{Knows, Score};
 use crate::chart::truths::Truths;
 use crate::chart::turning;
 use crate::method::{self, AtlasMethod, Ours, OursUnrolled, ScreenMethod};
+use crate::metrics;
 use crate::renderer::{AtlasRenderer, Gpu, Scene as Model};
 use crate::rivals;
 
@@ -194,7 +195,7 @@ impl<'a> Lab<'a> {
         for (i, (name, setting, method)) in methods.iter().enumerate() {
             let (x_copy, interval_95) = clock::ratio(&times[i], &times[0]);
             let mut row = Row {
-                ms: clock::median(&times[i]),
+                ms: metrics::median(&times[i]),
                 x_copy,
                 fetches: method.fetches(scene.px_per_mm),
                 scratch_bytes_per_pixel: Some(method.scratch_bytes_per_pixel()),
@@ -208,7 +209,7 @@ impl<'a> Lab<'a> {
             done.intervals.push(interval(scene, name, setting, times[i].len(), interval_95));
         }
         done.keep_images(&images)?;
-        Ok(clock::median(&times[0]))
+        Ok(metrics::median(&times[0]))
     }
 
     /// Every method in texture space.
@@ -256,7 +257,7 @@ impl<'a> Lab<'a> {
                 times.push(run()?);
             }
             let result = read(&self.gpu, scene, &output);
-            let ms = clock::median(&times);
+            let ms = metrics::median(&times);
             let pixels = f64::from(scene.size[0]) * f64::from(scene.size[1]);
             let texels = f64::from(size) * f64::from(size);
             let setting = size.to_string();
@@ -316,7 +317,7 @@ impl<'a> Lab<'a> {
                 let times = &times[s * count + m];
                 let (x_copy, interval_95) = clock::ratio(times, copy);
                 done.rows.push(Row {
-                    ms: clock::median(times),
+                    ms: metrics::median(times),
                     x_copy,
                     fetches: method.fetches(scene.px_per_mm),
                     scratch_bytes_per_pixel: Some(method.scratch_bytes_per_pixel()),

@@ -29,13 +29,13 @@ use std::time::Instant;
 use crate::Error;
 use serde_json::json;
 
-use crate::output;
 use crate::renderer::Scene as Model;
+use crate::{cli, metrics, output};
 use files::Chart;
 use lab::{Lab, METHODS};
 use options::{Options, Plan};
 use plot::Series;
-use progress::{Host, Interval, Progress, Visibility};
+use progress::{Done, Host, Interval, Progress, Visibility};
 use report::SceneImages;
 use row::Row;
 
@@ -43,27 +43,12 @@ use row::Row;
 const TALLEST_MM: f32 = 3000.0;
 
 pub fn main() -> ExitCode {
-    match Options::parse().and_then(|options| options.map_or(Ok(()), |o| chart(&o))) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    cli::main(options::HELP, Options::parse, |options| chart(&options))
 }
 
 fn chart(options: &Options) -> Result<(), Error> {
     let started = Instant::now();
-    let (model_name, model) = match &options.model {
-        Some(path) => (path.display().to_string(), Model::load(path)?),
-        None => ("the built-in head (MakeHuman base mesh, CC0)".to_owned(), Model::from_glb(crate::HEAD)?),
-    };
-    let (least, greatest) = model.skin_bounds();
-    let extent_mm = (greatest - least).max_element() * options.mm_per_unit;
-    if extent_mm > TALLEST_MM {
-        let got = format!("a model of {extent_mm} mm");
-        return Err(Error::new("--mm-per-unit", got, format!("at most {TALLEST_MM} mm")));
-    }
+    let (model_name, model) = load(options)?;
     let mut scenes = scene::names();
     scenes.extend(["turning".into(), "costs".into(), "heads".into()]);
     let scenes = chosen("--scenes", options.scenes.as_ref(), scenes)?;
@@ -99,10 +84,33 @@ fn chart(options: &Options) -> Result<(), Error> {
             }
         });
     }
-
     let rows: Vec<Row> = done.iter().flat_map(|d| d.rows.clone()).collect();
+    write(options, &lab, &model_name, &done, &rows)?;
+    progress.forget();
+    lab.bar.finish_and_clear();
+    println!("{}", table(&rows));
+    println!("{} in {:.0} s", options.out.join("report.html").display(), started.elapsed().as_secs_f64());
+    Ok(())
+}
+
+/// The model and its name.
+fn load(options: &Options) -> Result<(String, Model), Error> {
+    let (name, model) = match &options.model {
+        Some(path) => (path.display().to_string(), Model::load(path)?),
+        None => ("the built-in head (MakeHuman base mesh, CC0)".to_owned(), Model::from_glb(crate::HEAD)?),
+    };
+    let (least, greatest) = model.skin_bounds();
+    let extent_mm = (greatest - least).max_element() * options.mm_per_unit;
+    if extent_mm > TALLEST_MM {
+        let got = format!("a model of {extent_mm} mm");
+        return Err(Error::new("--mm-per-unit", got, format!("at most {TALLEST_MM} mm")));
+    }
+    Ok((name, model))
+}
+
+fn write(options: &Options, lab: &Lab, model: &str, done: &[Done], rows: &[Row]) -> Result<(), Error> {
     let mut images: Vec<SceneImages> = Vec::new();
-    for scene in &done {
+    for scene in done {
         images.extend(scene.images()?);
     }
     let heads: Vec<Series> = done.iter().flat_map(|d| d.heads.clone()).collect();
@@ -118,38 +126,25 @@ fn chart(options: &Options) -> Result<(), Error> {
         options => format!("cargo run --release --example chart -- {}", options.join(" ")),
     };
     let [width, height] = lab.plan.size;
-    let commit = commit();
-    let clock = lab.clock.name();
+    let (commit, clock, adapter) = (commit(), lab.clock.name(), &lab.gpu.adapter);
     let about = json!({
-        "adapter": lab.gpu.adapter,
+        "adapter": adapter,
         "clock": clock,
         "commit": commit,
         "host": host,
-        "model": model_name,
+        "model": model,
         "size": format!("{width}x{height}"),
         "command": command,
         "visibility_error": visibility,
         "x_copy_intervals_95": intervals,
         "notes": notes,
     });
-    let files = files::files(&Chart {
-        rows: &rows,
-        about: &about,
-        caption: &format!(
-            "{}, {width}×{height}, {model_name}\n{clock}, commit {commit}\n`{command}`",
-            lab.gpu.adapter
-        ),
-        heads: &heads,
-        images: &images,
-    })
-    .map_err(|e| Error::new("chart", format!("\"{e}\""), "files that can be made"))?;
+    let caption = format!("{adapter}, {width}×{height}, {model}\n{clock}, commit {commit}\n`{command}`");
+    let chart = Chart { rows, about: &about, caption: &caption, heads: &heads, images: &images };
+    let files = files::files(&chart)
+        .map_err(|e| Error::new("chart", format!("\"{e}\""), "files that can be made"))?;
     output::write(&options.out, &files)
-        .map_err(|e| Error::new("--out", format!("\"{e}\""), "a directory to write to"))?;
-    progress.forget();
-    lab.bar.finish_and_clear();
-    println!("{}", table(&rows));
-    println!("{} in {:.0} s", options.out.join("report.html").display(), started.elapsed().as_secs_f64());
-    Ok(())
+        .map_err(|e| Error::new("--out", format!("\"{e}\""), "a directory to write to"))
 }
 
 /// What was asked for of `known`, or all of it.
@@ -206,7 +201,7 @@ fn host_note(host: &[&Host]) -> Option<String> {
     let of_method = |name: &str| {
         let of = |value: fn(&Host) -> f64| {
             let mine = names.iter().zip(host).filter(|(n, _)| *n == name);
-            clock::median(&mine.map(|(_, h)| value(h)).collect::<Vec<_>>())
+            metrics::median(&mine.map(|(_, h)| value(h)).collect::<Vec<_>>())
         };
         format!(
             "{} prepares in {:.0} µs, staging {} bytes, and records in {:.0} µs",

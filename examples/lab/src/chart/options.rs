@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use crate::Error;
-
 use crate::chart::clock::Rounds;
+use crate::cli::Arguments;
 
-const HELP: &str = "\
+pub const HELP: &str = "\
 Times every method on every scene, measures how far it is from the exact integrals, and draws one
 against the other.
 
@@ -40,10 +40,9 @@ pub struct Options {
 }
 
 impl Options {
-    /// The command line; `None` when it asked for help.
-    pub fn parse() -> Result<Option<Self>, Error> {
-        use lexopt::prelude::*;
-
+    /// # Errors
+    /// An option that is not known, or a value that does not fit.
+    pub fn parse(arguments: &mut Arguments) -> Result<Self, Error> {
         let mut options = Self {
             scenes: None,
             methods: None,
@@ -54,54 +53,22 @@ impl Options {
             cache: "out/chart-cache".into(),
             out: "out/chart".into(),
         };
-        let refused = |e: lexopt::Error| {
-            let got = format!("\"{e}\"");
-            Error::new("command line", got, "options as --help lists them")
-        };
-        let mut parser = lexopt::Parser::from_env();
-        while let Some(arg) = parser.next().map_err(refused)? {
-            let name = match arg {
-                Long(name) => name.to_string(),
-                Short('h') => "help".into(),
-                other => return Err(refused(other.unexpected())),
-            };
-            let mut text = || parser.value().and_then(|v| v.string()).map_err(refused);
-            let list = |text: String| Some(text.split(',').map(|name| name.trim().to_owned()).collect());
+        while let Some(name) = arguments.next()? {
             match name.as_str() {
-                "help" => {
-                    print!("{HELP}");
-                    return Ok(None);
-                }
-                "quick" => options.quick = true,
-                "scenes" => options.scenes = list(text()?),
-                "methods" => options.methods = list(text()?),
-                "model" => options.model = Some(text()?.into()),
-                "cache" => options.cache = text()?.into(),
-                "out" => options.out = text()?.into(),
-                "size" => options.size = Some(size(&text()?)?),
-                "mm-per-unit" => {
-                    let text = text()?;
-                    options.mm_per_unit =
-                        text.parse().ok().filter(|x: &f32| x.is_finite() && *x > 0.0).ok_or_else(|| {
-                            Error::new("--mm-per-unit", text, "a number above 0 and below 3.4e38")
-                        })?;
-                }
-                _ => return Err(refused(Long(name.as_str()).unexpected())),
+                "--quick" => options.quick = true,
+                "--scenes" => options.scenes = Some(arguments.names()?),
+                "--methods" => options.methods = Some(arguments.names()?),
+                "--model" => options.model = Some(arguments.value()?.into()),
+                "--cache" => options.cache = arguments.value()?.into(),
+                "--out" => options.out = arguments.value()?.into(),
+                // A pixel less would leave nothing once rims are taken off.
+                "--size" => options.size = Some(arguments.size(", at least 16x16", |side| side >= 16)?),
+                "--mm-per-unit" => options.mm_per_unit = arguments.positive()?,
+                _ => return Err(arguments.unknown()),
             }
         }
-        Ok(Some(options))
+        Ok(options)
     }
-}
-
-fn size(text: &str) -> Result<[u32; 2], Error> {
-    text.split_once('x')
-        .and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]))
-        // A pixel less would leave nothing once rims are taken off.
-        .filter(|size: &[u32; 2]| size.iter().all(|s| *s >= 16))
-        .ok_or_else(|| {
-            let needs = "WIDTHxHEIGHT in pixels, such as 512x512, at least 16x16";
-            Error::new("--size", text, needs)
-        })
 }
 
 /// What `--quick` cuts, and nothing else does.

@@ -9,7 +9,6 @@ use subsurface::Profile;
 use subsurface::wgpu::TextureView;
 
 use crate::Error;
-use crate::chart::clock;
 use crate::chart::heads::time_atlas;
 use crate::chart::options::Plan;
 use crate::chart::scene::{Scene, Surface, rgb};
@@ -49,7 +48,11 @@ impl Turned {
     /// The least, the median and the worst.
     pub fn spread(&self) -> [f64; 3] {
         let errors = || self.errors.iter().copied();
-        [errors().fold(f64::INFINITY, f64::min), clock::median(&self.errors), errors().fold(0.0, f64::max)]
+        [
+            errors().fold(f64::INFINITY, f64::min),
+            metrics::median(&self.errors),
+            errors().fold(0.0, f64::max),
+        ]
     }
 
     /// How many times as much as at rest a frame is off while the light turns, at most; none, of atlases.
@@ -145,7 +148,7 @@ pub fn figure(
         }
         step();
     }
-    turned.iter_mut().zip(times).for_each(|(turned, times)| turned.ms = clock::median(&times));
+    turned.iter_mut().zip(times).for_each(|(turned, times)| turned.ms = metrics::median(&times));
     Ok((scene, Turned { errors: fallen, ms: f64::NAN, ..Turned::default() }, turned))
 }
 

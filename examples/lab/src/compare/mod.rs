@@ -18,6 +18,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use subsurface::{Atlas, DEFAULT_MAX_ERROR, Frame, Plan, Profile, wgpu};
 
 use crate::chart::truths::eq7;
+use crate::cli::Arguments;
 use crate::method::{self, Ours, OursUnrolled, ScreenMethod};
 use crate::metrics::{self, Layer};
 use crate::profile::Description;
@@ -26,7 +27,7 @@ use crate::renderer::{
     Scene, View,
 };
 use crate::truth::Patch;
-use crate::{output, srgb};
+use crate::{cli, output, srgb};
 use report::{DIFFERENCE_GAIN, ModeReport, Report};
 
 /// Runs that a median is taken of: this many, or as many as fit into this time.
@@ -123,93 +124,58 @@ impl Default for Options {
 }
 
 pub fn main() -> ExitCode {
-    match options().and_then(|options| options.map_or(Ok(()), |o| compare(&o))) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    cli::main(HELP, options, |options| compare(&options))
 }
 
-/// The command line; `None` when it asked for help.
-fn options() -> Result<Option<Options>, Error> {
-    use lexopt::prelude::*;
-
+fn options(arguments: &mut Arguments) -> Result<Options, Error> {
     let mut options = Options::default();
     let mut has_distance = false;
-    let mut parser = lexopt::Parser::from_env();
-    let refused =
-        |e: lexopt::Error| Error::new("command line", format!("\"{e}\""), "options as --help lists them");
-    while let Some(arg) = parser.next().map_err(refused)? {
-        let Long(name) = &arg else {
-            if let Short('h') = arg {
-                print!("{HELP}");
-                return Ok(None);
-            }
-            return Err(refused(arg.unexpected()));
-        };
-        let name = name.to_string();
-        if name == "help" {
-            print!("{HELP}");
-            return Ok(None);
-        }
-        let mut text = || -> Result<String, Error> {
-            let text = parser.value().and_then(|v| v.string()).map_err(refused)?;
-            // A value that was forgotten, before the next option.
-            let is_option = text.starts_with("--");
-            if is_option {
-                Err(Error::new(format!("--{name}"), text, "a value of its own"))
-            } else {
-                Ok(text)
-            }
-        };
+    let degrees = |arguments: &mut Arguments| {
+        arguments.number("a number within ±3.4e38", |degrees: &f32| degrees.is_finite())
+    };
+    while let Some(name) = arguments.next()? {
         match name.as_str() {
-            "model" => options.model = Some(text()?.into()),
-            "out" => {
-                let text = text()?;
-                if text.is_empty() {
-                    return Err(Error::new("--out", "\"\"", "a directory"));
-                }
-                options.out = text.into();
-            }
-            "size" => options.size = size(&text()?)?,
-            "view" => {
-                options.view_name = text()?;
+            "--model" => options.model = Some(arguments.value()?.into()),
+            "--out" => options.out = arguments.value()?.into(),
+            "--size" => options.size = arguments.size("", |_| true)?,
+            "--view" => {
+                options.view_name = arguments.value()?;
                 options.view = options.view_name.parse()?;
             }
-            "look-at" => options.look_at = Some(point(&text()?)?),
-            "distance" => {
-                options.distance_mm = positive("--distance", &text()?)?;
+            "--look-at" => {
+                let needs = "X,Y,Z in scene units, such as 0,1.6,0";
+                options.look_at = Some(arguments.value_by(needs, point)?);
+            }
+            "--distance" => {
+                options.distance_mm = arguments.positive()?;
                 has_distance = true;
             }
-            "turn" => options.turn_degrees = number("--turn", &text()?)?,
-            "skin" => options.skin[0] = names(&text()?),
-            "not-skin" => options.skin[1] = names(&text()?),
-            "profile" => options.material = Description::load(&text()?)?,
-            "specular" => options.lighting.specular = text()?.parse()?,
-            "light" => {
+            "--turn" => options.turn_degrees = degrees(arguments)?,
+            "--skin" => options.skin[0] = arguments.names()?,
+            "--not-skin" => options.skin[1] = arguments.names()?,
+            "--profile" => options.material = Description::load(&arguments.value()?)?,
+            "--specular" => options.lighting.specular = arguments.value()?.parse()?,
+            "--light" => {
                 let specular = options.lighting.specular;
-                options.lighting = Lighting { specular, ..light(&text()?)? };
+                let lighting = arguments.value_by("portrait or behind", |text| match text {
+                    "portrait" => Some(Lighting::default()),
+                    "behind" => Some(Lighting::behind()),
+                    _ => None,
+                })?;
+                options.lighting = Lighting { specular, ..lighting };
             }
-            "back" => options.has_back = true,
-            "eq7" => options.has_eq7 = true,
-            "environment" => options.environment = Some(Environment::named(&text()?)?),
-            "environment-turn" => {
-                options.environment_turn_degrees = number("--environment-turn", &text()?)?;
-            }
-            "max-error" => options.max_error = max_error(&text()?)?,
-            "mm-per-unit" => options.mm_per_unit = positive("--mm-per-unit", &text()?)?,
-            "exposure" => options.exposure = positive("--exposure", &text()?)?,
-            "texture-size" => {
-                let text = text()?;
-                let texels = text.parse().ok().filter(|n| *n > 0);
+            "--back" => options.has_back = true,
+            "--eq7" => options.has_eq7 = true,
+            "--environment" => options.environment = Some(Environment::named(&arguments.value()?)?),
+            "--environment-turn" => options.environment_turn_degrees = degrees(arguments)?,
+            "--max-error" => options.max_error = arguments.max_error()?,
+            "--mm-per-unit" => options.mm_per_unit = arguments.positive()?,
+            "--exposure" => options.exposure = arguments.positive()?,
+            "--texture-size" => {
                 let needs = "a whole number of texels, 1 or more";
-                options.texture_size = texels.ok_or_else(|| Error::new("--texture-size", text, needs))?;
+                options.texture_size = arguments.number(needs, |texels| *texels > 0)?;
             }
-            _ => {
-                return Err(refused(lexopt::Error::UnexpectedOption(format!("--{name}"))));
-            }
+            _ => return Err(arguments.unknown()),
         }
     }
     if has_distance && options.look_at.is_none() {
@@ -223,55 +189,12 @@ fn options() -> Result<Option<Options>, Error> {
     if let Some(environment) = &options.environment {
         environment.light(&mut options.lighting, options.environment_turn_degrees.to_radians());
     }
-    Ok(Some(options))
+    Ok(options)
 }
 
-fn size(text: &str) -> Result<[u32; 2], Error> {
-    text.split_once('x')
-        .and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]))
-        .ok_or_else(|| Error::new("--size", text, "WIDTHxHEIGHT in pixels, such as 512x512"))
-}
-
-fn light(text: &str) -> Result<Lighting, Error> {
-    match text {
-        "portrait" => Ok(Lighting::default()),
-        "behind" => Ok(Lighting::behind()),
-        _ => Err(Error::new("--light", text, "portrait or behind")),
-    }
-}
-
-fn point(text: &str) -> Result<Vec3, Error> {
+fn point(text: &str) -> Option<Vec3> {
     let numbers: Option<Vec<f32>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
-    let point = numbers.and_then(|numbers| Some(Vec3::from(<[f32; 3]>::try_from(numbers).ok()?)));
-    point
-        .filter(|point| point.is_finite())
-        .ok_or_else(|| Error::new("--look-at", text, "X,Y,Z in scene units, such as 0,1.6,0"))
-}
-
-fn names(text: &str) -> Vec<String> {
-    text.split(',').map(str::to_owned).collect()
-}
-
-fn number(input: &str, text: &str) -> Result<f32, Error> {
-    let number: Option<f32> = text.parse().ok();
-    let finite = number.filter(|x| x.is_finite());
-    finite.ok_or_else(|| Error::new(input, text, "a number within ±3.4e38"))
-}
-
-fn positive(input: &str, text: &str) -> Result<f32, Error> {
-    let positive = number(input, text).ok().filter(|x| *x > 0.0);
-    positive.ok_or_else(|| Error::new(input, text, "a number above 0 and below 3.4e38"))
-}
-
-/// A number, or a fraction such as 1/255.
-pub(crate) fn max_error(text: &str) -> Result<f32, Error> {
-    let number = |text: &str| text.trim().parse::<f32>().ok();
-    match text.split_once('/') {
-        Some((parts, whole)) => number(parts).zip(number(whole)).map(|(p, w)| p / w),
-        None => number(text),
-    }
-    .filter(|x| x.is_finite() && *x > 0.0)
-    .ok_or_else(|| Error::new("--max-error", text, "a number above 0, such as 1/255"))
+    Some(Vec3::from(<[f32; 3]>::try_from(numbers?).ok()?)).filter(|point| point.is_finite())
 }
 
 /// A mode's scattered irradiance on the device, and what it cost.
@@ -308,21 +231,7 @@ fn compare(options: &Options) -> Result<(), Error> {
     };
 
     step("loading the model");
-    let (model, mut scene) = match &options.model {
-        Some(path) => (path.display().to_string(), Scene::load(path)?),
-        None => ("built-in head".to_owned(), Scene::from_glb(crate::HEAD)?),
-    };
-    let (low, high) = scene.bounds();
-    let size_mm = (high - low).max_element() * options.mm_per_unit;
-    if !(size_mm > 0.0 && size_mm < 1e9) {
-        let needs = "one above 0 and below 1e9 mm; --mm-per-unit says how long its unit is";
-        return Err(Error::new(model, format!("a size of {size_mm} mm"), needs));
-    }
-    scene.choose(&options.skin[0], true, "--skin")?;
-    scene.choose(&options.skin[1], false, "--not-skin")?;
-    if let Some(albedo) = options.material.albedo {
-        scene.color_skin(Vec3::from(albedo.map(|a| a as f32)));
-    }
+    let (model, scene, size_mm) = load(options)?;
     let gpu = Gpu::headless()?;
 
     step("scattering");
@@ -347,13 +256,7 @@ fn compare(options: &Options) -> Result<(), Error> {
     let finest = mm_per_texel.iter().map(|(_, mm)| *mm).fold(f32::INFINITY, f32::min);
     let coarsest = mm_per_texel.iter().map(|(_, mm)| *mm).fold(0.0, f32::max);
     let measured = measure(&gpu, &shot, fine.as_ref(), &frame, options.exposure);
-    let runs: Vec<_> =
-        shot.modes.iter().filter(|m| m.runs > 0).map(|m| format!("{} of {}", m.title, m.runs)).collect();
-    let mut notes = vec![format!(
-        "Timings are medians of runs, submit and wait ({}); on a software driver they compare \
-         the modes with each other, not with a GPU.",
-        runs.join(", ")
-    )];
+    let mut notes = shot.notes(options, &frame);
     if fine.is_none() && !options.has_eq7 {
         notes.push("Pictures of this size are not anti-aliased: the device cannot render twice it.".into());
     }
@@ -361,15 +264,6 @@ fn compare(options: &Options) -> Result<(), Error> {
         notes.push(format!(
             "The primitives differ: {finest:.3} to {coarsest:.3} mm a texel; the coarsest is given."
         ));
-    }
-    notes.push(format!(
-        "Profile: {}, {} Gaussians, off by {:.4}, which comes on top of what a plan is off by.",
-        options.material.title,
-        options.profile.gaussians().len(),
-        options.profile.fit_error()
-    ));
-    if !frame.skin.contains(&true) {
-        notes.push("No skin is in view: --skin names it, --look-at and --turn look elsewhere.".into());
     }
     // A face of a doll, or of a statue; nobody's.
     if !(30.0..=3000.0).contains(&size_mm) {
@@ -408,6 +302,26 @@ fn compare(options: &Options) -> Result<(), Error> {
     println!("{}", report::table(&report));
     println!("{} in {:.1} s", options.out.join("report.html").display(), started.elapsed().as_secs_f64());
     Ok(())
+}
+
+/// The model, its name, and how long it is in mm.
+fn load(options: &Options) -> Result<(String, Scene, f32), Error> {
+    let (model, mut scene) = match &options.model {
+        Some(path) => (path.display().to_string(), Scene::load(path)?),
+        None => ("built-in head".to_owned(), Scene::from_glb(crate::HEAD)?),
+    };
+    let (low, high) = scene.bounds();
+    let size_mm = (high - low).max_element() * options.mm_per_unit;
+    if !(size_mm > 0.0 && size_mm < 1e9) {
+        let needs = "one above 0 and below 1e9 mm; --mm-per-unit says how long its unit is";
+        return Err(Error::new(model, format!("a size of {size_mm} mm"), needs));
+    }
+    scene.choose(&options.skin[0], true, "--skin")?;
+    scene.choose(&options.skin[1], false, "--not-skin")?;
+    if let Some(albedo) = options.material.albedo {
+        scene.color_skin(Vec3::from(albedo.map(|a| a as f32)));
+    }
+    Ok((model, scene, size_mm))
 }
 
 impl Shot {
@@ -514,9 +428,40 @@ impl Shot {
             title,
             view: output,
             runs: times.len(),
-            ms: median(&mut times),
+            ms: metrics::median(&times),
             atlas_ms: None,
         })
+    }
+
+    /// What the reader of its report should know.
+    fn notes(&self, options: &Options, frame: &Skin) -> Vec<String> {
+        let timed = self.modes.iter().filter(|m| m.runs > 0);
+        let runs: Vec<_> = timed.map(|m| format!("{} of {}", m.title, m.runs)).collect();
+        let mut notes = vec![
+            format!(
+                "Timings are medians of runs, submit and wait ({}); on a software driver they compare \
+                 the modes with each other, not with a GPU.",
+                runs.join(", ")
+            ),
+            format!(
+                "Profile: {}, {} Gaussians, off by {:.4}, which comes on top of what a plan is off by.",
+                options.material.title,
+                options.profile.gaussians().len(),
+                options.profile.fit_error()
+            ),
+        ];
+        if !frame.skin.contains(&true) {
+            notes.push("No skin is in view: --skin names it, --look-at and --turn look elsewhere.".into());
+        }
+        notes
+    }
+
+    /// What the camera sees of a mode.
+    fn picture(&self, gpu: &Gpu, mode: usize, shown: Shown, exposure: f32) -> RgbImage {
+        let [width, height] = self.size;
+        let pixels = self.renderer.compose(gpu, &self.modes[mode].view, shown, exposure);
+        RgbImage::from_raw(width, height, pixels.into_flattened())
+            .expect("the renderer gives a picture of its size")
     }
 
     /// Adds Eq. 7 over all of the mesh, each Gaussian divided by its mass, as a mode.
@@ -580,8 +525,8 @@ impl Shot {
             title: "texture space".into(),
             view: output,
             runs: both.len(),
-            ms: median(&mut both),
-            atlas_ms: Some([median(&mut raster), median(&mut blur)]),
+            ms: metrics::median(&both),
+            atlas_ms: Some([metrics::median(&raster), metrics::median(&blur)]),
         })
     }
 }
@@ -597,11 +542,6 @@ fn fraction(error: f32) -> String {
 
 fn more_runs(done: usize, most: usize, since: Instant) -> bool {
     done == 0 || (done < most && since.elapsed().as_secs_f64() < TIMED_SECONDS)
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// What the measures need of the G-buffer.
@@ -631,6 +571,19 @@ impl Skin {
             .collect();
         let albedo = gpu.read(&g.albedo).iter().map(|p| Vec4::from(*p).truncate()).collect();
         Self { skin, area, albedo }
+    }
+
+    /// Light that leaves the skin, by what its albedo leaves of the light in it.
+    fn radiance(&self, irradiance: &Layer) -> Layer {
+        let lit = irradiance.pixels.iter().zip(&self.albedo);
+        Layer { pixels: lit.map(|(e, a)| (Vec3::from(*e) * *a).to_array()).collect(), ..*irradiance }
+    }
+
+    /// The light on all of the skin in view.
+    fn energy(&self, irradiance: &Layer) -> f64 {
+        let pixels = irradiance.pixels.iter().zip(&self.area).zip(&self.skin);
+        let skin = pixels.filter(|(_, skin)| **skin);
+        skin.map(|((e, area), _)| f64::from(e.iter().sum::<f32>()) * area).sum()
     }
 }
 
@@ -684,28 +637,18 @@ struct Measured {
 fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: f32) -> Measured {
     let [width, height] = shot.size;
     let modes = &shot.modes;
-    let layer = |pixels: Vec<[f32; 3]>| Layer { width, height, pixels };
-    let light = |m: &Scattered| gpu.read(&m.view).iter().map(|p| [p[0], p[1], p[2]]).collect();
-    let irradiance: Vec<Layer> = modes.iter().map(|m| layer(light(m))).collect();
-    let radiance: Vec<Layer> = irradiance
-        .iter()
-        .map(|e| {
-            let lit = e.pixels.iter().zip(&frame.albedo);
-            layer(lit.map(|(e, a)| (Vec3::from(*e) * *a).to_array()).collect())
-        })
-        .collect();
-    let picture = |shot: &Shot, i: usize, shown| {
-        let [width, height] = shot.size;
-        let diffuse = &shot.modes[i].view;
-        let pixels = shot.renderer.compose(gpu, diffuse, shown, exposure);
-        RgbImage::from_raw(width, height, pixels.into_flattened())
-            .expect("the renderer gives a picture of its size")
+    let light = |m: &Scattered| {
+        let pixels = gpu.read(&m.view).iter().map(|p| [p[0], p[1], p[2]]).collect();
+        Layer { width, height, pixels }
     };
+    let irradiance: Vec<Layer> = modes.iter().map(light).collect();
+    let radiance: Vec<Layer> = irradiance.iter().map(|e| frame.radiance(e)).collect();
     let smooth = |i, shown| match fine {
-        Some(fine) => srgb::halved(&picture(fine, i, shown)),
-        None => picture(shot, i, shown),
+        Some(fine) => srgb::halved(&fine.picture(gpu, i, shown, exposure)),
+        None => shot.picture(gpu, i, shown, exposure),
     };
-    let pictures: Vec<_> = (0..modes.len()).map(|i| picture(shot, i, Shown::Picture)).collect();
+    let pictures: Vec<_> =
+        (0..modes.len()).map(|i| shot.picture(gpu, i, Shown::Picture, exposure)).collect();
 
     // The rim of a silhouette is left out: there a pixel's E is as much of the edge as of the skin.
     let inner = metrics::erode(&frame.skin, width, height, 2);
@@ -718,36 +661,33 @@ fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: 
             .map(|((a, b), inner)| *inner && (Vec3::from(*a) - Vec3::from(*b)).abs().max_element() > 0.01)
             .collect::<Vec<_>>()
     });
-    let energy = |e: &Layer| -> f64 {
-        let pixels = e.pixels.iter().zip(&frame.area).zip(&frame.skin);
-        pixels
-            .filter(|(_, skin)| **skin)
-            .map(|((e, area), _)| f64::from(e.iter().sum::<f32>()) * area)
-            .sum()
+    // A measure of two layers, of a mode and of what it is held to, where that is there.
+    type Of = fn(&Layer, &Layer, &[bool]) -> Option<f64>;
+    let to = |layers: &[Layer], i: usize, other: Option<usize>, mask: &[bool], of: Of| {
+        other.and_then(|other| of(&layers[i], &layers[other], mask))
     };
-
+    let rmse = metrics::relative_rmse;
     let mut reports = Vec::new();
     for (i, mode) in modes.iter().enumerate() {
         let flip = reference.map(|r| metrics::flip_mean(&pictures[i], &pictures[r], &inner));
+        let energy = frame.energy(&irradiance[i]) / frame.energy(&irradiance[0]);
         reports.push(ModeReport {
             name: mode.name,
             title: mode.title.clone(),
             ms: mode.ms,
             ms_raster: mode.atlas_ms.map(|[raster, _]| raster),
             ms_blur: mode.atlas_ms.map(|[_, blur]| blur),
-            rel_rmse: reference
-                .and_then(|r| metrics::relative_rmse(&irradiance[i], &irradiance[r], &inner)),
-            rel_rmse_scattered: reference
-                .zip(scattered.as_ref())
-                .and_then(|(r, mask)| metrics::relative_rmse(&irradiance[i], &irradiance[r], mask)),
-            rel_rmse_eq7: truth
-                .and_then(|t| metrics::relative_rmse(&irradiance[i], &irradiance[t], &inner)),
-            max_error: reference.and_then(|r| metrics::max_error(&irradiance[i], &irradiance[r], &inner)),
-            delta_e2000_p99: reference
-                .and_then(|r| metrics::delta_e2000_percentile(&radiance[i], &radiance[r], &inner, 0.99)),
+            rel_rmse: to(&irradiance, i, reference, &inner, rmse),
+            rel_rmse_scattered: scattered
+                .as_ref()
+                .and_then(|mask| to(&irradiance, i, reference, mask, rmse)),
+            rel_rmse_eq7: to(&irradiance, i, truth, &inner, rmse),
+            max_error: to(&irradiance, i, reference, &inner, metrics::max_error),
+            delta_e2000_p99: to(&radiance, i, reference, &inner, |a, b, mask| {
+                metrics::delta_e2000_percentile(a, b, mask, 0.99)
+            }),
             flip_mean: flip.as_ref().and_then(|(mean, _)| *mean),
-            energy_ratio: Some(energy(&irradiance[i]) / energy(&irradiance[0]))
-                .filter(|ratio| ratio.is_finite()),
+            energy_ratio: Some(energy).filter(|ratio| ratio.is_finite()),
             picture: smooth(i, Shown::Picture),
             diffuse: smooth(i, Shown::Diffuse),
             difference: reference

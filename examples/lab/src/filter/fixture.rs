@@ -4,6 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use crate::Error;
+use crate::cli::Arguments;
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
     LayerAttributes, Text, WritableImage, f16,
@@ -124,6 +125,5 @@ impl Case {
 
 /// The filter's command line, but for the program's name.
 pub fn run(args: &[&str]) -> Result<(), Error> {
-    let options = Options::parse(lexopt::Parser::from_args(args))?;
-    crate::filter::filter(&options.expect("no help was asked for"))
+    crate::filter::filter(&Options::parse(&mut Arguments::new(args))?)
 }

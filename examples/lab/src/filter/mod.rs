@@ -24,8 +24,8 @@ use subsurface::{BackLayer, Frame, Plan};
 
 use crate::Error;
 use crate::method::{self, Ours};
-use crate::output;
 use crate::renderer::Gpu;
+use crate::{cli, output};
 use dump::{Camera, Dump};
 use options::Options;
 
@@ -33,15 +33,7 @@ use options::Options;
 const LARGEST_HALF: f32 = 65504.0;
 
 pub fn main() -> ExitCode {
-    match Options::parse(lexopt::Parser::from_env())
-        .and_then(|options| options.map_or(Ok(()), |o| filter(&o)))
-    {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    cli::main(options::HELP, Options::parse, |options| filter(&options))
 }
 
 fn filter(options: &Options) -> Result<(), Error> {

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use crate::Error;
+use crate::cli::Arguments;
 use crate::filter::read_text;
 use subsurface::{DEFAULT_MAX_ERROR, MAX_PROFILES, Profile};
 
-const HELP: &str = "\
+pub const HELP: &str = "\
 Scatters a frame that another program dumped; docs/dumps.md says how to write one.
 
 Usage: cargo run --release --example filter -- CASE_DIR --out FILE.exr [OPTIONS]
@@ -34,41 +35,30 @@ pub struct Options {
 }
 
 impl Options {
-    /// The command line; `None` when it asked for help.
-    pub fn parse(mut parser: lexopt::Parser) -> Result<Option<Self>, Error> {
-        use lexopt::prelude::*;
-
-        let refused = |e: lexopt::Error| {
-            let got = format!("\"{e}\"");
-            Error::new("command line", got, "options as --help lists them")
-        };
-        let value = |parser: &mut lexopt::Parser| {
-            let value = parser.value().and_then(|v| v.string());
-            value.map_err(refused)
-        };
+    /// # Errors
+    /// An option that is not known, or a value that does not fit.
+    pub fn parse(arguments: &mut Arguments) -> Result<Self, Error> {
         let (mut case, mut out, mut max_error) = (None, None, None);
         let mut profiles = Vec::new();
         let mut variance_scale = 1.0;
         let (mut exact, mut png, mut plan) = (false, false, false);
-        while let Some(arg) = parser.next().map_err(refused)? {
-            match arg {
-                Short('h') | Long("help") => {
-                    print!("{HELP}");
-                    return Ok(None);
+        while let Some(name) = arguments.next()? {
+            match name.as_str() {
+                "--out" => {
+                    let exr = |text: &str| {
+                        let path = PathBuf::from(text);
+                        path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")).then_some(path)
+                    };
+                    out = Some(arguments.value_by("a file that ends in .exr", exr)?);
                 }
-                Long("out") => out = Some(exr_path(value(&mut parser)?)?),
-                Long("profile") => profiles.push(profile(&value(&mut parser)?)?),
-                Long("variance-scale") => {
-                    variance_scale = positive("--variance-scale", &value(&mut parser)?)?;
-                }
-                Long("max-error") => {
-                    max_error = Some(crate::compare::max_error(&value(&mut parser)?)?);
-                }
-                Long("exact") => exact = true,
-                Long("png") => png = true,
-                Long("plan") => plan = true,
-                Value(path) if case.is_none() => case = Some(PathBuf::from(path)),
-                other => return Err(refused(other.unexpected())),
+                "--profile" => profiles.push(profile(&arguments.value()?)?),
+                "--variance-scale" => variance_scale = arguments.positive()?,
+                "--max-error" => max_error = Some(arguments.max_error()?),
+                "--exact" => exact = true,
+                "--png" => png = true,
+                "--plan" => plan = true,
+                _ if case.is_none() && !name.starts_with('-') => case = Some(PathBuf::from(name)),
+                _ => return Err(arguments.unknown()),
             }
         }
         let missing = |what: &str| {
@@ -89,30 +79,15 @@ impl Options {
             let scaled = profile.scaled(variance_scale.sqrt());
             *profile = scaled.map_err(|e| Error::from(e).within("--variance-scale"))?;
         }
-        Ok(Some(Self {
+        Ok(Self {
             case: case.ok_or_else(|| missing("CASE_DIR"))?,
             out: out.ok_or_else(|| missing("--out FILE.exr"))?,
             profiles,
             max_error: (!exact).then_some(max_error.unwrap_or(DEFAULT_MAX_ERROR)),
             png,
             plan,
-        }))
+        })
     }
-}
-
-fn exr_path(text: String) -> Result<PathBuf, Error> {
-    let path = PathBuf::from(&text);
-    match path.extension() {
-        Some(extension) if extension.eq_ignore_ascii_case("exr") => Ok(path),
-        _ => Err(Error::new("--out", text, "a file that ends in .exr")),
-    }
-}
-
-fn positive(input: &str, text: &str) -> Result<f32, Error> {
-    text.parse()
-        .ok()
-        .filter(|x: &f32| x.is_finite() && *x > 0.0)
-        .ok_or_else(|| Error::new(input, text, "a number above 0 and below 3.4e38"))
 }
 
 fn profile(name: &str) -> Result<Profile, Error> {

@@ -411,7 +411,7 @@ channels light.exr R G A                | light.exr: channels: got A, G, R
 channels light.exr a.R a.G a.B R G B    | light.exr: channels: got B, G, R, a.B, a.G, a.R
 args --out                              | command line: got "
 args --out x.png                        | --out: got x.png
-args CASE_DIR                           | command line: got "unexpected argument "CASE_DIR""
+args CASE_DIR                           | command line: got "CASE_DIR"
 args --what                             | --what
 args --png=1                            | --png
 args --profile no.json                  | --profile: no.json: got "No such file

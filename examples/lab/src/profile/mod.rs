@@ -17,6 +17,7 @@ use std::process::ExitCode;
 use subsurface::physics::{Fit, Response};
 use subsurface::{DEFAULT_MAX_ERROR, Plan, Profile};
 
+use crate::cli::{self, Arguments};
 use crate::renderer::Gpu;
 use crate::{Error, output};
 
@@ -49,21 +50,13 @@ struct Options {
 }
 
 pub fn main() -> ExitCode {
-    let run =
-        |options: Options| if options.three_skins { three_skins(&options) } else { describe(&options) };
-    match options().and_then(|options| options.map_or(Ok(()), run)) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    cli::main(HELP, options, |options| match options.three_skins {
+        true => three_skins(&options),
+        false => describe(&options),
+    })
 }
 
-/// The command line; `None` when it asked for help.
-fn options() -> Result<Option<Options>, Error> {
-    use lexopt::prelude::*;
-
+fn options(arguments: &mut Arguments) -> Result<Options, Error> {
     let mut options = Options {
         material: String::new(),
         max_error: DEFAULT_MAX_ERROR,
@@ -72,50 +65,24 @@ fn options() -> Result<Option<Options>, Error> {
         paths: 200_000,
         out: "out/profile".into(),
     };
-    let refused =
-        |e: lexopt::Error| Error::new("command line", format!("\"{e}\""), "options as --help lists them");
-    let mut parser = lexopt::Parser::from_env();
-    while let Some(arg) = parser.next().map_err(refused)? {
-        let name = match arg {
-            Long(name) => name.to_string(),
-            Short('h') => "help".into(),
-            Value(text) if options.material.is_empty() => {
-                options.material = text.string().map_err(refused)?;
-                continue;
-            }
-            other => return Err(refused(other.unexpected())),
-        };
-        let mut text = || parser.value().and_then(|v| v.string()).map_err(refused);
+    while let Some(name) = arguments.next()? {
         match name.as_str() {
-            "help" => {
-                print!("{HELP}");
-                return Ok(None);
+            "--three-skins" => options.three_skins = true,
+            "--max-error" => options.max_error = arguments.max_error()?,
+            "--gaussians" => {
+                options.gaussians = Some(arguments.number("a whole number, 1 to 8", |_| true)?);
             }
-            "three-skins" => options.three_skins = true,
-            "max-error" => options.max_error = crate::compare::max_error(&text()?)?,
-            "gaussians" => {
-                let text = text()?;
-                let number = text.parse().ok();
-                let needs = "a whole number, 1 to 8";
-                options.gaussians = Some(number.ok_or_else(|| Error::new("--gaussians", text, needs))?);
-            }
-            "paths" => {
-                let text = text()?;
-                let number = text.parse().ok().filter(|n| *n > 0);
-                options.paths = number.ok_or_else(|| Error::new("--paths", text, "a whole number"))?;
-            }
-            "out" => options.out = text()?.into(),
-            _ => return Err(refused(lexopt::Error::UnexpectedOption(format!("--{name}")))),
+            "--paths" => options.paths = arguments.number("a whole number", |n| *n > 0)?,
+            "--out" => options.out = arguments.value()?.into(),
+            _ if options.material.is_empty() && !name.starts_with('-') => options.material = name,
+            _ => return Err(arguments.unknown()),
         }
     }
     if options.material.is_empty() && !options.three_skins {
-        return Err(Error::new(
-            "command line",
-            "no material",
-            format!("one of {}, or a file", NAMES.join(", ")),
-        ));
+        let needs = format!("one of {}, or a file", NAMES.join(", "));
+        return Err(Error::new("command line", "no material", needs));
     }
-    Ok(Some(options))
+    Ok(options)
 }
 
 fn describe(options: &Options) -> Result<(), Error> {

@@ -20,7 +20,7 @@ mod unwrapped;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use crate::Error;
+use crate::{Error, cli};
 use case::{Case, GROUPS, Judged};
 pub use cases::sizes;
 use lab::Lab;
@@ -28,12 +28,16 @@ pub use options::Options;
 use report::Report;
 
 pub fn main() -> ExitCode {
-    let outcome = Options::parse().and_then(|options| options.map_or(Ok(vec![]), |o| atlas(&o)));
-    let errors = outcome.unwrap_or_else(|error| vec![error.to_string()]);
-    for error in &errors {
-        eprintln!("error: {error}");
-    }
-    if errors.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    cli::main(options::HELP, Options::parse, |options| {
+        let worse = atlas(&options)?;
+        for line in &worse {
+            eprintln!("error: {line}");
+        }
+        match worse.len() {
+            0 => Ok(()),
+            count => Err(Error::new("atlas", format!("{count} that are worse than known"), "none")),
+        }
+    })
 }
 
 /// Runs the cases and writes what came out; what is worse than it is known to be, a line each.

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use crate::Error;
+use crate::cli::Arguments;
 
-const HELP: &str = "\
+pub const HELP: &str = "\
 Tries every method where methods fail, and writes what came out: failures.md and pictures.
 
 Usage: cargo run --release --example stability -- [OPTIONS]
@@ -24,30 +25,19 @@ pub struct Options {
 }
 
 impl Options {
-    /// The command line; `None` when it asked for help.
-    pub fn parse() -> Result<Option<Self>, Error> {
-        use lexopt::prelude::*;
-
+    /// # Errors
+    /// An option that is not known.
+    pub fn parse(arguments: &mut Arguments) -> Result<Self, Error> {
         let mut options = Self { quick: false, only: None, out: "out/stability".into() };
-        let refused = |e: lexopt::Error| {
-            let got = format!("\"{e}\"");
-            Error::new("command line", got, "options as --help lists them")
-        };
-        let text = |parser: &mut lexopt::Parser| parser.value().and_then(|v| v.string()).map_err(refused);
-        let mut parser = lexopt::Parser::from_env();
-        while let Some(arg) = parser.next().map_err(refused)? {
-            match arg {
-                Short('h') | Long("help") => {
-                    print!("{HELP}");
-                    return Ok(None);
-                }
-                Long("quick") => options.quick = true,
-                Long("only") => options.only = Some(text(&mut parser)?),
-                Long("out") => options.out = text(&mut parser)?.into(),
-                other => return Err(refused(other.unexpected())),
+        while let Some(name) = arguments.next()? {
+            match name.as_str() {
+                "--quick" => options.quick = true,
+                "--only" => options.only = Some(arguments.value()?),
+                "--out" => options.out = arguments.value()?.into(),
+                _ => return Err(arguments.unknown()),
             }
         }
-        Ok(Some(options))
+        Ok(options)
     }
 
     pub fn wants(&self, title: &str) -> bool {
