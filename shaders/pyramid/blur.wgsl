@@ -147,8 +147,6 @@ struct Taps {
     square: vec3f,
     // The sum of all weights.
     wanted: vec3f,
-    // The mean of those that share their taps, in square pixels.
-    variance: f32,
 }
 
 // Of the taps (1, 0), (0, 1), (1, 1), (1, −1), as powers of 2.
@@ -158,7 +156,6 @@ fn ring(k: vec3f) -> vec4f {
 
 fn taps_of(plane: Plane, scale: Scale, lattice: Lattice) -> Taps {
     var taps = Taps();
-    var weight = 0.0;
     for (var j = 0u; j < 3u; j++) {
         if j < BLURS {
             let blur = level.blurs[j];
@@ -178,12 +175,8 @@ fn taps_of(plane: Plane, scale: Scale, lattice: Lattice) -> Taps {
             taps.k11 += w.z * middle;
             taps.k1m += w.w * middle;
             taps.wanted += color;
-            let of_all = color.r + color.g + color.b;
-            weight += of_all;
-            taps.variance += of_all * blur.variance;
         }
     }
-    taps.variance = select(level.blurs[0].variance, taps.variance / weight, weight > NEGLIGIBLE_WEIGHT);
     if SQUARE {
         let color = weight_at(scale, level.blurs[3].slot);
         if any(color > vec3f(0.0)) {

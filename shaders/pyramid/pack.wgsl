@@ -151,7 +151,8 @@ fn pack(pixel: vec2i) {
     if packed.bend > STEP {
         // Taps of the tiles beside this one reach it, too.
         let place = pixel & vec2i(i32(TILE) - 1);
-        let beside = select(vec2i(0), vec2i(-1), place < vec2i(REACH)) + select(vec2i(0), vec2i(1), place >= vec2i(i32(TILE) - REACH));
+        let before = select(vec2i(0), vec2i(-1), place < vec2i(REACH));
+        let beside = before + select(vec2i(0), vec2i(1), place >= vec2i(i32(TILE) - REACH));
         let tile = pixel / i32(TILE);
         tell(tile + vec2i(beside.x, 0), packed.brightness);
         tell(tile + vec2i(0, beside.y), packed.brightness);
