@@ -7,7 +7,9 @@ use image::codecs::jpeg::JpegEncoder;
 
 use crate::Error;
 use crate::output;
-use crate::stability::case::{Bound, Case, GROUPS, INPUT, Judged, Known, METHODS, Verdict, short};
+use crate::stability::case::{
+    ATLAS, Bound, Case, EXACT, GROUPS, INPUT, Judged, Known, METHODS, PLAN, Verdict, short,
+};
 use crate::stability::strip::strip;
 use crate::svg::Rasteriser;
 
@@ -77,14 +79,33 @@ fn picture_name(judged: &Judged) -> String {
     format!("failures-{}.jpg", words.collect::<Vec<_>>().join("-"))
 }
 
+/// A method, in the head of a table.
+fn label(method: &str) -> &str {
+    match method {
+        EXACT => "exact",
+        PLAN => "plan",
+        ATLAS => "texture space",
+        "jimenez_2009" => "Jimenez 2009",
+        "jimenez_separable" => "separable",
+        "fitted_separable" => "fitted",
+        "burley_disk" => "Burley",
+        "texture_cascade" => "cascade",
+        "jimenez_2010" => "+ 2010",
+        "jimenez_2010_derived" => "+ derived",
+        "burley_2015" => "+ Burley",
+        other => other,
+    }
+}
+
 fn table(rows: &[&Judged]) -> String {
     let mut used: Vec<&str> = METHODS.into_iter().chain([INPUT]).collect();
     used.retain(|m| rows.iter().any(|row| row.figure(m).is_some()));
-    let mut text = format!("| | passes | degraded | {} |\n|---|---|---|", used.join(" | "));
+    let labels: Vec<&str> = used.iter().map(|method| label(method)).collect();
+    let mut text = format!("||passes/degraded|{}|\n|---|---|", labels.join("|"));
     text += &"---|".repeat(used.len());
     for Judged { case, outcome, .. } in rows {
         let [passes, degrades] = [case.bound.passes, case.bound.degrades].map(short);
-        let _ = write!(text, "\n| {} | ≤ {passes} | ≤ {degrades} |", case.name);
+        let _ = write!(text, "\n|{}|{passes}/{degrades}|", case.name);
         for method in &used {
             let figure = outcome.figures.iter().find(|(m, _)| m == method);
             let cell = figure.map_or(String::new(), |(_, figure)| match case.verdict(*figure) {
@@ -92,7 +113,7 @@ fn table(rows: &[&Judged]) -> String {
                 Verdict::Degraded => format!("*{}*", short(*figure)),
                 Verdict::Fails => format!("**{}**", short(*figure)),
             });
-            let _ = write!(text, " {cell} |");
+            let _ = write!(text, "{cell}|");
         }
     }
     text + "\n"
