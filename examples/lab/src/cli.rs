@@ -45,7 +45,7 @@ impl Arguments {
     ///
     /// # Errors
     /// A flag that was given a value; what is not UTF-8.
-    pub fn next(&mut self) -> Result<Option<String>, Error> {
+    pub fn next_word(&mut self) -> Result<Option<String>, Error> {
         let Some(word) = self.parser.next().map_err(refused)? else {
             return Ok(None);
         };
@@ -144,7 +144,7 @@ mod tests {
     /// What `read` makes of an option's value.
     fn of<T>(value: &str, read: impl FnOnce(&mut Arguments) -> Result<T, Error>) -> Result<T, String> {
         let mut arguments = Arguments::new(["--option", value]);
-        assert_eq!(arguments.next(), Ok(Some("--option".into())));
+        assert_eq!(arguments.next_word(), Ok(Some("--option".into())));
         read(&mut arguments).map_err(|e| e.to_string())
     }
 

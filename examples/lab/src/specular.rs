@@ -50,7 +50,7 @@ pub fn main() -> ExitCode {
 /// The slope and where to write to.
 fn options(arguments: &mut Arguments) -> Result<(f32, PathBuf), Error> {
     let (mut slope, mut out) = (0.3, PathBuf::from("out/specular"));
-    while let Some(name) = arguments.next()? {
+    while let Some(name) = arguments.next_word()? {
         match name.as_str() {
             "--slope" => slope = arguments.number("0.05 to 1", |x| (0.05..=1.0).contains(x))?,
             "--out" => out = arguments.value()?.into(),

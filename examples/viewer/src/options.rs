@@ -58,7 +58,7 @@ impl Options {
             environment: None,
             out: "out/viewer".into(),
         };
-        while let Some(name) = arguments.next()? {
+        while let Some(name) = arguments.next_word()? {
             match name.as_str() {
                 "--mm-per-unit" => options.mm_per_unit = arguments.positive()?,
                 "--size" => {

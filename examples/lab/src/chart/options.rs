@@ -53,7 +53,7 @@ impl Options {
             cache: "out/chart-cache".into(),
             out: "out/chart".into(),
         };
-        while let Some(name) = arguments.next()? {
+        while let Some(name) = arguments.next_word()? {
             match name.as_str() {
                 "--quick" => options.quick = true,
                 "--scenes" => options.scenes = Some(arguments.names()?),

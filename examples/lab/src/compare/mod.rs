@@ -133,7 +133,7 @@ fn options(arguments: &mut Arguments) -> Result<Options, Error> {
     let degrees = |arguments: &mut Arguments| {
         arguments.number("a number within ±3.4e38", |degrees: &f32| degrees.is_finite())
     };
-    while let Some(name) = arguments.next()? {
+    while let Some(name) = arguments.next_word()? {
         match name.as_str() {
             "--model" => options.model = Some(arguments.value()?.into()),
             "--out" => options.out = arguments.value()?.into(),

@@ -42,7 +42,7 @@ impl Options {
         let mut profiles = Vec::new();
         let mut variance_scale = 1.0;
         let (mut exact, mut png, mut plan) = (false, false, false);
-        while let Some(name) = arguments.next()? {
+        while let Some(name) = arguments.next_word()? {
             match name.as_str() {
                 "--out" => {
                     let exr = |text: &str| {

@@ -65,7 +65,7 @@ fn options(arguments: &mut Arguments) -> Result<Options, Error> {
         paths: 200_000,
         out: "out/profile".into(),
     };
-    while let Some(name) = arguments.next()? {
+    while let Some(name) = arguments.next_word()? {
         match name.as_str() {
             "--three-skins" => options.three_skins = true,
             "--max-error" => options.max_error = arguments.max_error()?,

@@ -29,7 +29,7 @@ impl Options {
     /// An option that is not known.
     pub fn parse(arguments: &mut Arguments) -> Result<Self, Error> {
         let mut options = Self { quick: false, only: None, out: "out/stability".into() };
-        while let Some(name) = arguments.next()? {
+        while let Some(name) = arguments.next_word()? {
             match name.as_str() {
                 "--quick" => options.quick = true,
                 "--only" => options.only = Some(arguments.value()?),
