@@ -12,9 +12,9 @@ struct Settings {
     far: f32,
     // 0: all of the surface is of the first profile.
     has_id: u32,
-    // Of id i the component i − 1, four to a vector: the first id of an equal profile, so that light crosses from
-    // the one to the other; 0 where there is no profile.
-    ids: array<vec4u, 4>,
+    // Which id comes first of those of an equal profile, so that light crosses from the one to the other: four
+    // bits for each id from 1 on, of what is counted from 0. Others stay what they are.
+    first_ids: vec2u,
 }
 
 const MAX_PROFILES = 16u;
@@ -33,17 +33,16 @@ fn vs_main(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
 @fragment
 fn fs_positions(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let pixel = vec2i(at.xy) + vec2i(settings.first_pixel);
-    var id = 1u;
-    if settings.has_id != 0u {
-        id = textureLoad(profile_id, pixel, 0).r;
-    }
+    // No branch on a uniform: lavapipe 22.3 grows by 0.4 MiB a frame with one here, as it compiles anew.
+    var id = select(1u, textureLoad(profile_id, pixel, 0).r, settings.has_id != 0u);
     let d = textureLoad(depth, pixel, 0).r;
-    if id == 0u || id > MAX_PROFILES || d == settings.far {
+    if id == 0u || d == settings.far {
         return vec4f(0.0);
     }
-    id = settings.ids[(id - 1u) / 4u][(id - 1u) % 4u];
-    if id == 0u {
-        return vec4f(0.0);
+    let i = id - 1u;
+    if i < MAX_PROFILES {
+        let bits = select(settings.first_ids.x, settings.first_ids.y, i >= 8u);
+        id = 1u + ((bits >> (4u * (i % 8u))) & 15u);
     }
     let uv = at.xy / settings.size;
     let p = settings.inverse_projection * vec4f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y, d, 1.0);

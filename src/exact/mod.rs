@@ -38,18 +38,19 @@ struct Settings {
     size: Vec2,
     far: f32,
     has_id: u32,
-    pad: [u32; 2],
-    ids: [u32; MAX_PROFILES],
+    first_ids: [u32; 2],
 }
 
-/// Of each id, counted from 1, the first one of an equal profile; 0 of those that have none.
-fn first_equal_ids(profiles: &[Profile]) -> [u32; MAX_PROFILES] {
-    let mut ids = [0; MAX_PROFILES];
-    for (id, profile) in ids.iter_mut().zip(profiles) {
-        let first = profiles.iter().zip(1..).find(|(p, _)| p.gaussians() == profile.gaussians());
-        *id = first.map_or(0, |(_, first)| first);
+/// As the shader has them: four bits for each profile, for the first one that is equal.
+fn first_ids(profiles: &[Profile]) -> [u32; 2] {
+    let mut ids = 0u64;
+    for i in 0..MAX_PROFILES {
+        let is_equal = |p: &Profile| profiles.get(i).is_some_and(|q| p.gaussians() == q.gaussians());
+        // Ids without a profile stay what they are.
+        let first = profiles.iter().position(is_equal).unwrap_or(i);
+        ids |= (first as u64) << (4 * i);
     }
-    ids
+    [ids as u32, (ids >> 32) as u32]
 }
 
 /// The passes.
@@ -144,8 +145,7 @@ impl Exact {
             size: UVec2::from(size).as_vec2(),
             far: optics.far,
             has_id: 0,
-            pad: [0; 2],
-            ids: first_equal_ids(profiles),
+            first_ids: first_ids(profiles),
         };
         let front = (frame.depth, frame.profile_id);
         self.prepare_surface(device, queue, &mut view.front, numbers, front);
@@ -230,7 +230,7 @@ mod tests {
         assert_layout!(
             SHADER,
             "Settings",
-            Settings { inverse_projection, first_pixel, size, far, has_id, ids }
+            Settings { inverse_projection, first_pixel, size, far, has_id, first_ids }
         );
         assert_eq!(crate::wgsl::constant(SHADER, "MAX_PROFILES") as usize, MAX_PROFILES);
     }
