@@ -188,7 +188,7 @@ fn many_heads() -> Case {
             Ok(figures.into())
         },
     )
-    .known([known(PLAN, 0.037, why)])
+    .known([known(PLAN, 0.021, why)])
 }
 
 /// Every head is lit from a side of its own; neighbours stand 40 mm or more behind each other.
