@@ -33,10 +33,10 @@ pub struct Frame<'a> {
     pub projection: [[f32; 4]; 4],
     /// Length of a scene unit in mm. Default: 1000, a scene in metres.
     pub mm_per_unit: f32,
-    /// How near skin comes to the camera along its axis, in units of the scene: less than the bounding spheres of
-    /// all heads. Plans then record no passes for levels that only nearer skin needs, of 23 at 1920×1080 some ten;
-    /// skin that is nearer all the same scatters too little. Default, `None`: the near plane. Orthographic
-    /// cameras need none.
+    /// The distance of the nearest skin along the camera's axis, in units of the scene, or less: the nearest point
+    /// of all bounding spheres. A plan leaves out the passes that only nearer skin needs: 11 are left of 23 for a
+    /// head that fills a third of 1920×1080. Skin that is nearer all the same scatters too little. Default,
+    /// `None`: the near plane. Orthographic cameras do not need it.
     pub nearest: Option<f32>,
     /// Which of the plan's profiles a pixel scatters by, counted from 1; 0 where nothing scatters. One
     /// unsigned integer channel, such as R8Uint. Default, `None`: all that is nearer than the far plane
@@ -67,9 +67,9 @@ pub struct Frame<'a> {
 /// shadows its own back, so without them it glows on the wrong side. A mesh that is closed is needed; of an open
 /// one, or of a card, the back is another part or none.
 ///
-/// Textures are of the frame's size and projection, and follow [`Frame::viewport`]. Only what lies within 3.5 σ
-/// of the profile's widest Gaussian of visible skin counts, 9.5 mm for skin (by a plan as far as its error can tell: 6.7 mm at 1/255); elsewhere they
-/// may hold anything.
+/// Textures are of the frame's size and projection, and follow [`Frame::viewport`]. Only what lies near behind
+/// visible skin counts, elsewhere they may hold anything: within 3.5 σ of the widest Gaussian by the exact sum,
+/// 9.5 mm for skin; by a plan as far as its error can tell, 6.7 mm at 1/255.
 /// Each Gaussian is summed over both layers by distance in space and divided by its mass over both, so that even
 /// light stays even.
 #[derive(Clone, Copy, Debug)]

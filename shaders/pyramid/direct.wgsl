@@ -1,10 +1,10 @@
-// Where anything may be around: edges, layers, creases, slopes under sharp light. Each Gaussian is summed over the
-// level that is as fine as it asks for, by distance in space, around the pixel's own place:
+// Where anything may be around: edges, layers, creases, slopes under sharp light. Each Gaussian is summed over
+// the level that is as fine as it asks for, by distance in space, around the pixel's own place:
 //
 //   L(p) = w₀ E(p) + Σ_j w_j Σ_q k_j(q) A(q) E(q) / Σ_q k_j(q) A(q)
 //
-// On the frame nothing is interpolated, and no coarser pixel stands for this one; a level adds the mean of those that
-// are coarser. Follows blur.wgsl.
+// On the frame nothing is interpolated, and no coarser pixel stands for this one; a level adds the mean of those
+// that are coarser. Follows blur.wgsl.
 //
 // [LS15] Li & Shao 2015, Eq. 7 and 12.
 
@@ -149,8 +149,9 @@ fn together(step: Step, scale: Scale) -> Together {
     return Together(weight, passed, variance);
 }
 
-// Light around a pixel of a surface, and its area: by a Gaussian over a level whose pixels are as the plane has them,
-// of whose variance the level has `own` px² already. Weights end where the distance off the plane is 1/√`in_space`.
+// Light around a pixel of a surface, and its area: by a Gaussian over a level whose pixels are as the plane has
+// them, of whose variance the level has `own` px² already. Weights end where the distance off the plane is
+// 1/√`in_space`.
 fn summed(l: u32, center: vec2f, shape: Shape, plane: Plane, variance_mm2: f32, in_space: f32, own: f32) -> vec4f {
     let k = on_plane(variance_mm2, plane.m, own);
     // The ball, as it is seen.
@@ -327,8 +328,8 @@ fn fs_level(@builtin(position) at: vec4f) -> @location(0) vec4f {
     if any(t.passed > vec3f(0.0)) {
         let variance_mm2 = t.variance * scale.mm2;
         let own = level.blurs[0].own;
-        // What the pyramid blurs by itself knows no distance off the plane, which on a bent surface grows as that on
-        // it to the fourth: taps make up for it, by a power found on heads.
+        // What the pyramid blurs by itself knows no distance off the plane, which on a bent surface grows as that
+        // on it to the fourth: taps make up for it, by a power found on heads.
         let told = 1.0 - own / max(t.variance, 1e-3);
         let in_space = 1.0 / (CUT * max(t.variance, NARROWEST_IN_SPACE) * scale.mm2 * pow(told, 1.5));
         let there = summed(l, vec2f(pixel), shape, plane, variance_mm2, in_space, own);

@@ -53,7 +53,7 @@ struct Groups {
     /// The weights of the plan that they bind.
     weights: Buffer,
     read: Textures,
-    /// The coarsest level that skin at the near plane needs, of those that there are.
+    /// The coarsest level that the nearest skin needs, of those that there are.
     last: usize,
     viewport: Option<Viewport>,
     pack: BindGroup,
