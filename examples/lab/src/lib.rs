@@ -20,6 +20,7 @@ pub mod model;
 pub mod output;
 #[cfg(feature = "programs")]
 mod page;
+mod passes;
 #[cfg(feature = "programs")]
 pub mod profile;
 pub mod renderer;

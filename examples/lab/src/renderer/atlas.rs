@@ -5,9 +5,10 @@
 use crate::Error;
 use subsurface::{Atlas, TextureSpace};
 use web_time::Instant;
-use wgpu::TextureFormat;
+use wgpu::{BindingResource, LoadOp, TextureFormat};
 
-use super::{Gpu, IRRADIANCE, Pipeline, Renderer, mesh::Mesh};
+use super::{Gpu, IRRADIANCE, Renderer, mesh::Mesh};
+use crate::passes::{self, CLEAR, Pipeline, Slot};
 
 /// The atlas of one page, used for one after the other.
 pub struct AtlasRenderer {
@@ -31,101 +32,25 @@ impl AtlasRenderer {
         }
         let size = [size, size];
         let device = &gpu.device;
-        let light_shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("subsurface_lab::renderer atlas"),
-            source: wgpu::ShaderSource::Wgsl(
-                [
-                    TextureSpace::VERTEX_WGSL,
-                    include_str!("material.wgsl"),
-                    super::lighting::SHADER,
-                    include_str!("atlas.wgsl"),
-                ]
-                .concat()
-                .into(),
-            ),
-        });
-        let light = super::pipeline(
-            gpu,
-            Pipeline {
-                label: "subsurface_lab::renderer atlas",
-                shader: &light_shader,
-                vertex: "vs_atlas",
-                fragment: "fs_atlas",
-                groups: &[
-                    Some(&renderer.camera_layout),
-                    Some(&renderer.material_layout),
-                    Some(&renderer.lights.layout),
-                ],
-                targets: &[IRRADIANCE, TextureFormat::Rgba32Float],
-                buffers: &[Mesh::VERTEX_LAYOUT],
-                depth_stencil: None,
-            },
-        );
-
-        let resample_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("subsurface_lab::renderer resample"),
-            entries: &[
-                wgpu::BindGroupLayoutEntry {
-                    binding: 0,
-                    visibility: wgpu::ShaderStages::FRAGMENT,
-                    ty: wgpu::BindingType::Texture {
-                        sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                        view_dimension: wgpu::TextureViewDimension::D2,
-                        multisampled: false,
-                    },
-                    count: None,
-                },
-                wgpu::BindGroupLayoutEntry {
-                    binding: 1,
-                    visibility: wgpu::ShaderStages::FRAGMENT,
-                    ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
-                    count: None,
-                },
-            ],
-        });
-        let resample_shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("subsurface_lab::renderer resample"),
-            source: wgpu::ShaderSource::Wgsl(
-                [include_str!("material.wgsl"), include_str!("resample.wgsl")].concat().into(),
-            ),
-        });
-        let resample = super::pipeline(
-            gpu,
-            Pipeline {
-                label: "subsurface_lab::renderer resample",
-                shader: &resample_shader,
-                vertex: "vs_screen",
-                fragment: "fs_resample",
-                groups: &[
-                    Some(&renderer.camera_layout),
-                    Some(&renderer.material_layout),
-                    Some(&resample_layout),
-                ],
-                targets: &[IRRADIANCE],
-                buffers: &[Mesh::VERTEX_LAYOUT],
-                depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Equal, false)),
-            },
-        );
+        let light = light_pipeline(gpu, renderer);
+        let label = "subsurface_lab::renderer resample";
+        let layout = passes::layout(device, label, &[Slot::Filtered, Slot::Sampler]);
+        let wgsl = [include_str!("material.wgsl"), include_str!("resample.wgsl")];
+        let shader = passes::module(device, label, &wgsl);
+        let resample = Pipeline {
+            groups: &[Some(&renderer.camera_layout), Some(&renderer.material_layout), Some(&layout)],
+            targets: &[IRRADIANCE.into()],
+            buffers: &[Mesh::VERTEX_LAYOUT],
+            depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Equal, false)),
+            ..Pipeline::of(label, &shader, ["vs_screen", "fs_resample"])
+        }
+        .make(device);
 
         let target = |name, format| gpu.target(name, size, format);
         let scattered = target("subsurface_lab::renderer atlas scattered", IRRADIANCE);
-        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("subsurface_lab::renderer resample"),
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..Default::default()
-        });
-        let resample_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("subsurface_lab::renderer resample"),
-            layout: &resample_layout,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 0,
-                    resource: wgpu::BindingResource::TextureView(&scattered),
-                },
-                wgpu::BindGroupEntry { binding: 1, resource: wgpu::BindingResource::Sampler(&sampler) },
-            ],
-        });
+        let sampler = passes::linear_sampler(device, label);
+        let resources = [BindingResource::TextureView(&scattered), BindingResource::Sampler(&sampler)];
+        let resample_group = passes::group(device, label, &layout, &resources);
         Ok(Self {
             irradiance: target("subsurface_lab::renderer atlas irradiance", IRRADIANCE),
             positions: target("subsurface_lab::renderer atlas positions", TextureFormat::Rgba32Float),
@@ -195,15 +120,8 @@ impl AtlasRenderer {
         mesh: &Mesh,
         page: std::ops::Range<u32>,
     ) {
-        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("subsurface_lab::renderer atlas"),
-            color_attachments: &[
-                Some(super::color_attachment(&self.irradiance, clear)),
-                Some(super::color_attachment(&self.positions, clear)),
-            ],
-            ..Default::default()
-        });
+        let targets = [(&self.irradiance, CLEAR), (&self.positions, CLEAR)];
+        let mut pass = passes::begin(encoder, "subsurface_lab::renderer atlas", &targets, None);
         pass.set_pipeline(&self.light);
         pass.set_bind_group(0, &renderer.camera_group, &[]);
         pass.set_bind_group(1, &mesh.material, &[]);
@@ -219,19 +137,36 @@ impl AtlasRenderer {
         page: std::ops::Range<u32>,
         output: &wgpu::TextureView,
     ) {
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("subsurface_lab::renderer resample"),
-            color_attachments: &[Some(super::color_attachment(output, wgpu::LoadOp::Load))],
-            depth_stencil_attachment: Some(super::depth_attachment(
-                &renderer.gbuffer.depth,
-                wgpu::LoadOp::Load,
-            )),
-            ..Default::default()
-        });
+        let depth = super::depth_attachment(&renderer.gbuffer.depth, LoadOp::Load);
+        let targets = [(output, LoadOp::Load)];
+        let mut pass = passes::begin(encoder, "subsurface_lab::renderer resample", &targets, Some(depth));
         pass.set_pipeline(&self.resample);
         pass.set_bind_group(0, &renderer.camera_group, &[]);
         pass.set_bind_group(1, &mesh.material, &[]);
         pass.set_bind_group(2, &self.resample_group, &[]);
         mesh.draw(&mut pass, page);
     }
+}
+
+/// Draws a mesh into UV space, lit.
+fn light_pipeline(gpu: &Gpu, renderer: &Renderer) -> wgpu::RenderPipeline {
+    let label = "subsurface_lab::renderer atlas";
+    let wgsl = [
+        TextureSpace::VERTEX_WGSL,
+        include_str!("material.wgsl"),
+        super::lighting::SHADER,
+        include_str!("atlas.wgsl"),
+    ];
+    let shader = passes::module(&gpu.device, label, &wgsl);
+    Pipeline {
+        groups: &[
+            Some(&renderer.camera_layout),
+            Some(&renderer.material_layout),
+            Some(&renderer.lights.layout),
+        ],
+        targets: &[IRRADIANCE.into(), TextureFormat::Rgba32Float.into()],
+        buffers: &[Mesh::VERTEX_LAYOUT],
+        ..Pipeline::of(label, &shader, ["vs_atlas", "fs_atlas"])
+    }
+    .make(&gpu.device)
 }

@@ -5,7 +5,8 @@ use subsurface::BackLayer;
 use wgpu::{TextureFormat, TextureView};
 
 use super::mesh::Mesh;
-use super::{DEPTH, Gpu, IRRADIANCE, Pipeline, Renderer};
+use super::{DEPTH, Gpu, IRRADIANCE, Renderer};
+use crate::passes::{self, CLEAR, Pipeline};
 
 /// Textures of the back layer, and the pass that draws it.
 pub struct BackRenderer {
@@ -21,33 +22,22 @@ impl BackRenderer {
     pub fn new(gpu: &Gpu, renderer: &Renderer) -> Self {
         let label = "subsurface_lab::renderer back";
         let target = |format| gpu.target(label, renderer.size, format);
-        let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(
-                [include_str!("material.wgsl"), super::lighting::SHADER, include_str!("back.wgsl")]
-                    .concat()
-                    .into(),
-            ),
-        });
+        let wgsl = [include_str!("material.wgsl"), super::lighting::SHADER, include_str!("back.wgsl")];
+        let shader = passes::module(&gpu.device, label, &wgsl);
         let (layout, visible) = super::textures(gpu, label, None, &[&renderer.gbuffer.depth]);
-        let draw = super::pipeline(
-            gpu,
-            Pipeline {
-                label,
-                shader: &shader,
-                vertex: "vs_screen",
-                fragment: "fs_back",
-                groups: &[
-                    Some(&renderer.camera_layout),
-                    Some(&renderer.material_layout),
-                    Some(&renderer.lights.layout),
-                    Some(&layout),
-                ],
-                targets: &[IRRADIANCE, TextureFormat::R8Uint],
-                buffers: &[Mesh::VERTEX_LAYOUT],
-                depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Greater, true)),
-            },
-        );
+        let draw = Pipeline {
+            groups: &[
+                Some(&renderer.camera_layout),
+                Some(&renderer.material_layout),
+                Some(&renderer.lights.layout),
+                Some(&layout),
+            ],
+            targets: &[IRRADIANCE.into(), TextureFormat::R8Uint.into()],
+            buffers: &[Mesh::VERTEX_LAYOUT],
+            depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Greater, true)),
+            ..Pipeline::of(label, &shader, ["vs_screen", "fs_back"])
+        }
+        .make(&gpu.device);
         Self {
             irradiance: target(IRRADIANCE),
             depth: target(DEPTH),
@@ -59,18 +49,11 @@ impl BackRenderer {
 
     /// Draws and lights what is behind the frame that `renderer` drew last: of skin alone.
     pub fn render(&self, gpu: &Gpu, renderer: &Renderer) {
-        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+        let targets = [(&self.irradiance, CLEAR), (&self.profile_id, CLEAR)];
+        let depth = super::depth_attachment(&self.depth, wgpu::LoadOp::Clear(0.0));
         gpu.run(|encoder| {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("subsurface_lab::renderer back"),
-                color_attachments: &[&self.irradiance, &self.profile_id]
-                    .map(|view| Some(super::color_attachment(view, clear))),
-                depth_stencil_attachment: Some(super::depth_attachment(
-                    &self.depth,
-                    wgpu::LoadOp::Clear(0.0),
-                )),
-                ..Default::default()
-            });
+            let label = "subsurface_lab::renderer back";
+            let mut pass = passes::begin(encoder, label, &targets, Some(depth));
             pass.set_pipeline(&self.draw);
             pass.set_bind_group(0, &renderer.camera_group, &[]);
             pass.set_bind_group(2, &renderer.lights.group, &[]);

@@ -4,7 +4,8 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 use wgpu::TextureFormat;
 
-use super::{Gpu, Pipeline, Specular};
+use super::{Gpu, Specular};
+use crate::passes::{self, CLEAR, Pipeline};
 
 const SHADER: &str = concat!(include_str!("brdf.wgsl"), include_str!("brdf_tables.wgsl"));
 /// Directions that a directional albedo is summed over.
@@ -39,24 +40,14 @@ impl BrdfTables {
         let label = "subsurface_lab::renderer brdf tables";
         let uniform = gpu.uniform::<TableUniform>(label);
         let (layout, group) = super::textures(gpu, label, Some(&uniform), &[]);
-        let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(SHADER.into()),
-        });
+        let shader = passes::module(&gpu.device, label, &[SHADER]);
         let pipeline = |fragment| {
-            super::pipeline(
-                gpu,
-                Pipeline {
-                    label,
-                    shader: &shader,
-                    vertex: "vs_main",
-                    fragment,
-                    groups: &[Some(&layout)],
-                    targets: &[TextureFormat::Rgba16Float],
-                    buffers: &[],
-                    depth_stencil: None,
-                },
-            )
+            Pipeline {
+                groups: &[Some(&layout)],
+                targets: &[TextureFormat::Rgba16Float.into()],
+                ..Pipeline::of(label, &shader, ["vs_main", fragment])
+            }
+            .make(&gpu.device)
         };
         Self { albedo: pipeline("fs_albedo"), lobes: pipeline("fs_lobes"), uniform, group }
     }
@@ -91,12 +82,8 @@ impl BrdfTables {
         let uniform = TableUniform { size, model: model as u32, samples: SAMPLES, slope, f0 };
         gpu.queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
         gpu.run(|encoder| {
-            let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("subsurface_lab::renderer brdf tables"),
-                color_attachments: &[Some(super::color_attachment(to, clear))],
-                ..Default::default()
-            });
+            let label = "subsurface_lab::renderer brdf tables";
+            let mut pass = passes::begin(encoder, label, &[(to, CLEAR)], None);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &self.group, &[]);
             pass.draw(0..3, 0..1);

@@ -13,6 +13,7 @@ use half::f16;
 use image::{DynamicImage, ImageReader};
 use rayon::prelude::*;
 
+use super::gpu::layer;
 use super::lighting::Maps;
 use super::{BrdfTables, Gpu, Light, Lighting, Sky, Specular};
 use crate::Error;
@@ -181,13 +182,7 @@ impl Environment {
         let reflectance = Maps::layers(gpu, BrdfTables::ALBEDO_SIZE, Specular::ALL.len() as u32);
         let tables = BrdfTables::new(gpu);
         for model in Specular::ALL {
-            let layer = reflectance.create_view(&wgpu::TextureViewDescriptor {
-                dimension: Some(wgpu::TextureViewDimension::D2),
-                base_array_layer: model as u32,
-                array_layer_count: Some(1),
-                ..Default::default()
-            });
-            tables.draw_albedo(gpu, model, &layer);
+            tables.draw_albedo(gpu, model, &layer(&reflectance, model as u32));
         }
         Maps::new(gpu, radiance, reflectance)
     }

@@ -108,6 +108,19 @@ impl Gpu {
             .create_view(&Default::default())
     }
 
+    /// A texture with layers, which passes render to and read from, and that can be written.
+    pub(super) fn layers(
+        &self,
+        label: &str,
+        size: [u32; 2],
+        layers: u32,
+        format: TextureFormat,
+    ) -> wgpu::Texture {
+        let mut descriptor = descriptor(label, size, format, TextureUsages::RENDER_ATTACHMENT);
+        descriptor.size.depth_or_array_layers = layers;
+        self.device.create_texture(&descriptor)
+    }
+
     /// A texture that holds `texels`, row by row.
     ///
     /// # Panics
@@ -210,6 +223,24 @@ impl Gpu {
             .poll(wgpu::PollType::wait_indefinitely())
             .expect("a headless device is only lost with its driver");
     }
+}
+
+/// All layers of a texture.
+pub(super) fn array(texture: &wgpu::Texture) -> TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        ..Default::default()
+    })
+}
+
+/// One layer of a texture.
+pub(super) fn layer(texture: &wgpu::Texture, base_array_layer: u32) -> TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2),
+        base_array_layer,
+        array_layer_count: Some(1),
+        ..Default::default()
+    })
 }
 
 /// Bytes on their way from the device.

@@ -7,15 +7,18 @@ use std::str::FromStr;
 use crate::Error;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Mat4, Vec2, Vec3, Vec4};
+use wgpu::BindingResource;
 
 use super::mesh::Mesh;
 use super::{DEPTH, Gpu};
+use crate::passes::{self, Pipeline, Slot};
 
 /// What shaders that light surfaces begin with.
 pub(super) const SHADER: &str = concat!(include_str!("brdf.wgsl"), include_str!("lighting.wgsl"));
 
 /// Side of the shadow maps in texels.
 const MAP_SIZE: u32 = 2048;
+const SHADOW: &str = "subsurface_lab::renderer shadow";
 
 /// A distant light with an extent, and so with soft shadows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -312,52 +315,21 @@ struct Shadow {
 impl Lights {
     pub fn new(gpu: &Gpu) -> Self {
         let device = &gpu.device;
-        let label = Some("subsurface_lab::renderer lighting");
-        let texture = |binding, sample_type| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty: wgpu::BindingType::Texture {
-                sample_type,
-                view_dimension: wgpu::TextureViewDimension::D2Array,
-                multisampled: false,
-            },
-            count: None,
-        };
-        let sampler = |binding, kind| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty: wgpu::BindingType::Sampler(kind),
-            count: None,
-        };
-        let filtered = wgpu::TextureSampleType::Float { filterable: true };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label,
-            entries: &[
-                super::uniform_entry(wgpu::ShaderStages::FRAGMENT),
-                texture(1, wgpu::TextureSampleType::Depth),
-                sampler(2, wgpu::SamplerBindingType::Comparison),
-                texture(3, filtered),
-                texture(4, filtered),
-                sampler(5, wgpu::SamplerBindingType::Filtering),
-            ],
-        });
-        let maps = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("subsurface_lab::renderer shadow maps"),
-            size: wgpu::Extent3d {
-                width: MAP_SIZE,
-                height: MAP_SIZE,
-                depth_or_array_layers: Lighting::MAX_LIGHTS as u32,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: DEPTH,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        let uniform = gpu.uniform::<LightingUniform>("subsurface_lab::renderer lighting");
+        let label = "subsurface_lab::renderer lighting";
+        let slots = [
+            Slot::Uniform,
+            Slot::DepthLayers,
+            Slot::Comparison,
+            Slot::FilteredLayers,
+            Slot::FilteredLayers,
+            Slot::Sampler,
+        ];
+        let layout = passes::layout(device, label, &slots);
+        let count = Lighting::MAX_LIGHTS as u32;
+        let maps = gpu.layers("subsurface_lab::renderer shadow maps", [MAP_SIZE; 2], count, DEPTH);
+        let uniform = gpu.uniform::<LightingUniform>(label);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
-            label,
+            label: Some(label),
             mag_filter: wgpu::FilterMode::Linear,
             min_filter: wgpu::FilterMode::Linear,
             compare: Some(wgpu::CompareFunction::LessEqual),
@@ -365,47 +337,20 @@ impl Lights {
         });
         let group = group(gpu, &layout, &uniform, &maps, &sampler, &Maps::none(gpu));
 
-        let label = Some("subsurface_lab::renderer shadow");
         let shader = device.create_shader_module(wgpu::include_wgsl!("shadow.wgsl"));
-        let map_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label,
-            entries: &[super::uniform_entry(wgpu::ShaderStages::VERTEX)],
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label,
-            bind_group_layouts: &[Some(&map_layout)],
-            immediate_size: 0,
-        });
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label,
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &shader,
-                entry_point: Some("vs_shadow"),
-                compilation_options: Default::default(),
-                buffers: &[Mesh::VERTEX_LAYOUT],
-            },
-            primitive: Default::default(),
+        let map_layout = passes::layout(device, SHADOW, &[Slot::Uniform]);
+        let pipeline = Pipeline {
+            groups: &[Some(&map_layout)],
+            buffers: &[Mesh::VERTEX_LAYOUT],
             depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Less, true)),
-            multisample: Default::default(),
-            fragment: None,
-            multiview_mask: None,
-            cache: None,
-        });
-        let shadow = |layer: usize| {
-            let to_clip = gpu.uniform::<Mat4>("subsurface_lab::renderer shadow");
+            ..Pipeline::of(SHADOW, &shader, ["vs_shadow", ""])
+        }
+        .make(device);
+        let shadow = |layer| {
+            let to_clip = gpu.uniform::<Mat4>(SHADOW);
             Shadow {
-                group: device.create_bind_group(&wgpu::BindGroupDescriptor {
-                    label,
-                    layout: &map_layout,
-                    entries: &[wgpu::BindGroupEntry { binding: 0, resource: to_clip.as_entire_binding() }],
-                }),
-                map: maps.create_view(&wgpu::TextureViewDescriptor {
-                    dimension: Some(wgpu::TextureViewDimension::D2),
-                    base_array_layer: layer as u32,
-                    array_layer_count: Some(1),
-                    ..Default::default()
-                }),
+                group: passes::group(device, SHADOW, &map_layout, &[to_clip.as_entire_binding()]),
+                map: super::gpu::layer(&maps, layer as u32),
                 to_clip,
             }
         };
@@ -436,14 +381,8 @@ impl Lights {
                     Mat4::from_cols(2.0 * Vec4::X, -2.0 * Vec4::Y, Vec4::Z, Vec4::new(-1.0, 1.0, 0.0, 1.0))
                         * light.to_map;
                 gpu.queue.write_buffer(&shadow.to_clip, 0, bytemuck::bytes_of(&to_clip));
-                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("subsurface_lab::renderer shadow"),
-                    depth_stencil_attachment: Some(super::depth_attachment(
-                        &shadow.map,
-                        wgpu::LoadOp::Clear(1.0),
-                    )),
-                    ..Default::default()
-                });
+                let depth = super::depth_attachment(&shadow.map, wgpu::LoadOp::Clear(1.0));
+                let mut pass = passes::begin(encoder, SHADOW, &[], Some(depth));
                 pass.set_pipeline(&self.pipeline);
                 pass.set_bind_group(0, &shadow.group, &[]);
                 for mesh in meshes {
@@ -481,19 +420,8 @@ impl Maps {
         Self { radiance, reflectance, sampler }
     }
 
-    pub fn layers(gpu: &Gpu, [width, height]: [u32; 2], layers: u32) -> wgpu::Texture {
-        gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("subsurface_lab::renderer environment"),
-            size: wgpu::Extent3d { width, height, depth_or_array_layers: layers },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::Rgba16Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING
-                | wgpu::TextureUsages::COPY_DST
-                | wgpu::TextureUsages::RENDER_ATTACHMENT,
-            view_formats: &[],
-        })
+    pub fn layers(gpu: &Gpu, size: [u32; 2], layers: u32) -> wgpu::Texture {
+        gpu.layers("subsurface_lab::renderer environment", size, layers, wgpu::TextureFormat::Rgba16Float)
     }
 }
 
@@ -506,27 +434,17 @@ fn group(
     sampler: &wgpu::Sampler,
     environment: &Maps,
 ) -> wgpu::BindGroup {
-    let layers = wgpu::TextureViewDescriptor {
-        dimension: Some(wgpu::TextureViewDimension::D2Array),
-        ..Default::default()
-    };
+    let [maps, radiance, reflectance] =
+        [maps, &environment.radiance, &environment.reflectance].map(super::gpu::array);
     let resources = [
         uniform.as_entire_binding(),
-        wgpu::BindingResource::TextureView(&maps.create_view(&layers)),
-        wgpu::BindingResource::Sampler(sampler),
-        wgpu::BindingResource::TextureView(&environment.radiance.create_view(&layers)),
-        wgpu::BindingResource::TextureView(&environment.reflectance.create_view(&layers)),
-        wgpu::BindingResource::Sampler(&environment.sampler),
+        BindingResource::TextureView(&maps),
+        BindingResource::Sampler(sampler),
+        BindingResource::TextureView(&radiance),
+        BindingResource::TextureView(&reflectance),
+        BindingResource::Sampler(&environment.sampler),
     ];
-    let entries: Vec<_> = (0..)
-        .zip(resources)
-        .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
-        .collect();
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some("subsurface_lab::renderer lighting"),
-        layout,
-        entries: &entries,
-    })
+    passes::group(&gpu.device, "subsurface_lab::renderer lighting", layout, &resources)
 }
 
 #[cfg(test)]

@@ -5,9 +5,13 @@ use std::ops::Range;
 use crate::Error;
 use bytemuck::{Pod, Zeroable};
 use wgpu::util::DeviceExt;
+use wgpu::{BindingResource, BufferUsages, TextureFormat};
 
-use super::scene::{Image, Scene, Vertex};
-use super::{Gpu, uniform_entry};
+use super::Gpu;
+use super::scene::{Image, Material, Primitive, Scene, Vertex};
+use crate::passes::{self, Slot};
+
+const LABEL: &str = "subsurface_lab::renderer mesh";
 
 /// `Material` of the shader.
 #[repr(C)]
@@ -20,6 +24,20 @@ pub(super) struct MaterialUniform {
     profile_id: u32,
     procedural: u32,
     pad: [u32; 3],
+}
+
+impl MaterialUniform {
+    fn of(primitive: &Primitive, material: &Material) -> Self {
+        Self {
+            base_color: material.base_color,
+            normal_scale: material.normal_scale,
+            alpha_cutoff: material.alpha_cutoff,
+            slope: (material.roughness * material.roughness).max(0.02),
+            profile_id: material.profile_id.into(),
+            procedural: primitive.procedural.into(),
+            pad: [0; 3],
+        }
+    }
 }
 
 /// One primitive, ready to be drawn.
@@ -47,30 +65,8 @@ impl Mesh {
 
     /// Layout of a material's bind group.
     pub fn material_layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
-        let texture = |binding| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty: wgpu::BindingType::Texture {
-                sample_type: wgpu::TextureSampleType::Float { filterable: true },
-                view_dimension: wgpu::TextureViewDimension::D2,
-                multisampled: false,
-            },
-            count: None,
-        };
-        gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("subsurface_lab::renderer material"),
-            entries: &[
-                uniform_entry(wgpu::ShaderStages::FRAGMENT),
-                texture(1),
-                texture(2),
-                wgpu::BindGroupLayoutEntry {
-                    binding: 3,
-                    visibility: wgpu::ShaderStages::FRAGMENT,
-                    ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
-                    count: None,
-                },
-            ],
-        })
+        let slots = [Slot::Uniform, Slot::Filtered, Slot::Filtered, Slot::Sampler];
+        passes::layout(&gpu.device, "subsurface_lab::renderer material", &slots)
     }
 
     /// All primitives of a scene.
@@ -78,78 +74,45 @@ impl Mesh {
     /// # Errors
     /// A primitive that is too large for a buffer.
     pub fn upload(gpu: &Gpu, scene: &Scene, layout: &wgpu::BindGroupLayout) -> Result<Vec<Self>, Error> {
-        let label = Some("subsurface_lab::renderer mesh");
         let texture = |index: Option<usize>, format, default: [u8; 4]| {
             let plain = Image { width: 1, height: 1, rgba8: default.to_vec() };
             upload_image(gpu, index.map_or(&plain, |i| &scene.images[i]), format)
         };
-        let sampler = |[u, v]: [wgpu::AddressMode; 2]| {
-            gpu.device.create_sampler(&wgpu::SamplerDescriptor {
-                label,
-                address_mode_u: u,
-                address_mode_v: v,
-                mag_filter: wgpu::FilterMode::Linear,
-                min_filter: wgpu::FilterMode::Linear,
-                mipmap_filter: wgpu::MipmapFilterMode::Linear,
-                ..Default::default()
-            })
-        };
-        let buffer = |contents: &[u8], usage| {
-            gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label, contents, usage })
-        };
-        scene
-            .primitives
-            .iter()
-            .map(|primitive| {
-                let largest = size_of_val(&*primitive.vertices).max(4 * primitive.indices.len());
-                let limit = gpu.device.limits().max_buffer_size;
-                if largest as u64 > limit {
-                    return Err(Error::new(
-                        &primitive.name,
-                        format!("{largest} bytes of vertices or indices"),
-                        format!("at most {limit}"),
-                    ));
-                }
-                let material = &scene.materials[primitive.material];
-                let uniform = MaterialUniform {
-                    base_color: material.base_color,
-                    normal_scale: material.normal_scale,
-                    alpha_cutoff: material.alpha_cutoff,
-                    slope: (material.roughness * material.roughness).max(0.02),
-                    profile_id: material.profile_id.into(),
-                    procedural: primitive.procedural.into(),
-                    pad: [0; 3],
-                };
-                let color =
-                    texture(material.base_color_texture, wgpu::TextureFormat::Rgba8UnormSrgb, [255; 4]);
-                let normal =
-                    texture(material.normal_texture, wgpu::TextureFormat::Rgba8Unorm, [128, 128, 255, 255]);
-                let uniform = buffer(bytemuck::bytes_of(&uniform), wgpu::BufferUsages::UNIFORM);
-                let sampler = sampler(material.wrap);
-                let resources = [
-                    uniform.as_entire_binding(),
-                    wgpu::BindingResource::TextureView(&color),
-                    wgpu::BindingResource::TextureView(&normal),
-                    wgpu::BindingResource::Sampler(&sampler),
-                ];
-                let entries = (0..).zip(resources);
-                let entries = entries.map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource });
-                let material_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-                    label,
+        let limit = gpu.device.limits().max_buffer_size;
+        let mesh = |primitive: &Primitive| {
+            let largest = size_of_val(&*primitive.vertices).max(4 * primitive.indices.len());
+            if largest as u64 > limit {
+                return Err(Error::new(
+                    &primitive.name,
+                    format!("{largest} bytes of vertices or indices"),
+                    format!("at most {limit}"),
+                ));
+            }
+            let material = &scene.materials[primitive.material];
+            let color = texture(material.base_color_texture, TextureFormat::Rgba8UnormSrgb, [255; 4]);
+            let normal = texture(material.normal_texture, TextureFormat::Rgba8Unorm, [128, 128, 255, 255]);
+            let uniform = MaterialUniform::of(primitive, material);
+            Ok(Self {
+                name: primitive.name.clone(),
+                index_count: primitive.indices.len() as u32,
+                pages: primitive.pages.clone(),
+                profile_id: material.profile_id,
+                material: passes::group(
+                    &gpu.device,
+                    LABEL,
                     layout,
-                    entries: &Vec::from_iter(entries),
-                });
-                Ok(Self {
-                    name: primitive.name.clone(),
-                    index_count: primitive.indices.len() as u32,
-                    pages: primitive.pages.clone(),
-                    profile_id: material.profile_id,
-                    material: material_group,
-                    vertices: buffer(bytemuck::cast_slice(&primitive.vertices), wgpu::BufferUsages::VERTEX),
-                    indices: buffer(bytemuck::cast_slice(&primitive.indices), wgpu::BufferUsages::INDEX),
-                })
+                    &[
+                        buffer(gpu, &[uniform], BufferUsages::UNIFORM).as_entire_binding(),
+                        BindingResource::TextureView(&color),
+                        BindingResource::TextureView(&normal),
+                        BindingResource::Sampler(&sampler(gpu, material.wrap)),
+                    ],
+                ),
+                vertices: buffer(gpu, &primitive.vertices, BufferUsages::VERTEX),
+                indices: buffer(gpu, &primitive.indices, BufferUsages::INDEX),
             })
-            .collect()
+        };
+        scene.primitives.iter().map(mesh).collect()
     }
 
     /// Draws a range of the indices.
@@ -158,6 +121,23 @@ impl Mesh {
         pass.set_index_buffer(self.indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.draw_indexed(indices, 0, 0..1);
     }
+}
+
+fn sampler(gpu: &Gpu, [u, v]: [wgpu::AddressMode; 2]) -> wgpu::Sampler {
+    gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some(LABEL),
+        address_mode_u: u,
+        address_mode_v: v,
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        mipmap_filter: wgpu::MipmapFilterMode::Linear,
+        ..Default::default()
+    })
+}
+
+fn buffer<T: Pod>(gpu: &Gpu, contents: &[T], usage: BufferUsages) -> wgpu::Buffer {
+    let contents = bytemuck::cast_slice(contents);
+    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: Some(LABEL), contents, usage })
 }
 
 /// An image with its mip levels, without those that are larger than the device takes.

@@ -46,8 +46,9 @@ use crate::Error;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat4, Vec3};
 use subsurface::Frame;
-use wgpu::{TextureFormat, TextureView};
+use wgpu::{BindingResource, TextureFormat, TextureView};
 
+use crate::passes::{self, CLEAR, Pipeline, Slot};
 use lighting::Lights;
 use mesh::Mesh;
 
@@ -73,6 +74,18 @@ pub struct GBuffer {
 }
 
 impl GBuffer {
+    fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
+        let target = |name, format| gpu.target(&format!("subsurface_lab::renderer {name}"), size, format);
+        Self {
+            albedo: target("albedo", TextureFormat::Rgba16Float),
+            normal: target("normal", TextureFormat::Rgba16Float),
+            profile_id: target("profile id", TextureFormat::R8Uint),
+            depth: target("depth", DEPTH),
+            irradiance: target("irradiance", IRRADIANCE),
+            specular: target("specular", TextureFormat::Rgba16Float),
+        }
+    }
+
     /// As the effects take it: with ids, whatever else a frame may have at its default.
     pub fn frame(&self, projection: Mat4, mm_per_unit: f32) -> Frame<'_> {
         let projection = projection.to_cols_array_2d();
@@ -138,94 +151,36 @@ impl Renderer {
     pub fn new(gpu: &Gpu, scene: &Scene, size: [u32; 2]) -> Result<Self, Error> {
         let device = &gpu.device;
         gpu.check_size(size)?;
-        let target = |name, format| gpu.target(name, size, format);
-        let gbuffer = GBuffer {
-            albedo: target("subsurface_lab::renderer albedo", TextureFormat::Rgba16Float),
-            normal: target("subsurface_lab::renderer normal", TextureFormat::Rgba16Float),
-            profile_id: target("subsurface_lab::renderer profile id", TextureFormat::R8Uint),
-            depth: target("subsurface_lab::renderer depth", DEPTH),
-            irradiance: target("subsurface_lab::renderer irradiance", IRRADIANCE),
-            specular: target("subsurface_lab::renderer specular", TextureFormat::Rgba16Float),
-        };
-        let camera_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("subsurface_lab::renderer camera"),
-            entries: &[uniform_entry(wgpu::ShaderStages::VERTEX_FRAGMENT)],
-        });
-        let camera = gpu.uniform::<CameraUniform>("subsurface_lab::renderer camera");
-        let camera_group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("subsurface_lab::renderer camera"),
-            layout: &camera_layout,
-            entries: &[wgpu::BindGroupEntry { binding: 0, resource: camera.as_entire_binding() }],
-        });
+        let gbuffer = GBuffer::new(gpu, size);
+        let label = "subsurface_lab::renderer camera";
+        let camera_layout = passes::layout(device, label, &[Slot::Uniform]);
+        let camera = gpu.uniform::<CameraUniform>(label);
+        let camera_group = passes::group(device, label, &camera_layout, &[camera.as_entire_binding()]);
         let material_layout = Mesh::material_layout(gpu);
         let lights = Lights::new(gpu);
-        let module = |name, parts: &[&str]| {
-            device.create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some(name),
-                source: wgpu::ShaderSource::Wgsl(parts.concat().into()),
-            })
-        };
 
-        let draw = pipeline(
-            gpu,
-            Pipeline {
-                label: "subsurface_lab::renderer gbuffer",
-                shader: &module(
-                    "subsurface_lab::renderer gbuffer",
-                    &[include_str!("material.wgsl"), include_str!("gbuffer.wgsl")],
-                ),
-                vertex: "vs_screen",
-                fragment: "fs_gbuffer",
-                groups: &[Some(&camera_layout), Some(&material_layout)],
-                targets: &[TextureFormat::Rgba16Float, TextureFormat::Rgba16Float, TextureFormat::R8Uint],
-                buffers: &[Mesh::VERTEX_LAYOUT],
-                depth_stencil: Some(depth_state(wgpu::CompareFunction::Greater, true)),
-            },
-        );
+        let label = "subsurface_lab::renderer deferred";
+        let wgsl = [include_str!("material.wgsl"), lighting::SHADER, include_str!("deferred.wgsl")];
+        let views = [&gbuffer.albedo, &gbuffer.normal, &gbuffer.profile_id, &gbuffer.depth];
+        let (shade_layout, shade_group) = textures(gpu, label, None, &views);
+        let shade = Pipeline {
+            groups: &[Some(&camera_layout), None, Some(&lights.layout), Some(&shade_layout)],
+            targets: &[IRRADIANCE.into(), TextureFormat::Rgba16Float.into()],
+            ..Pipeline::of(label, &passes::module(device, label, &wgsl), ["vs_main", "fs_lighting"])
+        }
+        .make(device);
 
-        let (shade_layout, shade_group) = textures(
-            gpu,
-            "subsurface_lab::renderer deferred",
-            None,
-            &[&gbuffer.albedo, &gbuffer.normal, &gbuffer.profile_id, &gbuffer.depth],
-        );
-        let shade = pipeline(
-            gpu,
-            Pipeline {
-                label: "subsurface_lab::renderer deferred",
-                shader: &module(
-                    "subsurface_lab::renderer deferred",
-                    &[include_str!("material.wgsl"), lighting::SHADER, include_str!("deferred.wgsl")],
-                ),
-                vertex: "vs_main",
-                fragment: "fs_lighting",
-                groups: &[Some(&camera_layout), None, Some(&lights.layout), Some(&shade_layout)],
-                targets: &[IRRADIANCE, TextureFormat::Rgba16Float],
-                buffers: &[],
-                depth_stencil: None,
-            },
-        );
-
-        let compose_uniform = gpu.uniform::<ComposeUniform>("subsurface_lab::renderer compose");
-        let (compose_layout, _) = textures(
-            gpu,
-            "subsurface_lab::renderer compose",
-            Some(&compose_uniform),
-            &[&gbuffer.irradiance, &gbuffer.albedo, &gbuffer.specular, &gbuffer.depth],
-        );
-        let compose = pipeline(
-            gpu,
-            Pipeline {
-                label: "subsurface_lab::renderer compose",
-                shader: &module("subsurface_lab::renderer compose", &[include_str!("compose.wgsl")]),
-                vertex: "vs_main",
-                fragment: "fs_compose",
-                groups: &[Some(&compose_layout)],
-                targets: &[PICTURE],
-                buffers: &[],
-                depth_stencil: None,
-            },
-        );
+        let label = "subsurface_lab::renderer compose";
+        let shader = passes::module(device, label, &[include_str!("compose.wgsl")]);
+        let compose_uniform = gpu.uniform::<ComposeUniform>(label);
+        let views = [&gbuffer.irradiance, &gbuffer.albedo, &gbuffer.specular, &gbuffer.depth];
+        let (compose_layout, _) = textures(gpu, label, Some(&compose_uniform), &views);
+        let compose = Pipeline {
+            groups: &[Some(&compose_layout)],
+            targets: &[PICTURE.into()],
+            ..Pipeline::of(label, &shader, ["vs_main", "fs_compose"])
+        }
+        .make(device);
         Ok(Self {
             meshes: Mesh::upload(gpu, scene, &material_layout)?,
             bounds: scene.bounds(),
@@ -233,10 +188,10 @@ impl Renderer {
             gbuffer,
             lights,
             camera,
-            camera_layout,
             camera_group,
+            draw: gbuffer_pipeline(device, &camera_layout, &material_layout),
+            camera_layout,
             material_layout,
-            draw,
             shade,
             shade_group,
             compose,
@@ -274,15 +229,11 @@ impl Renderer {
         self.lights.render(gpu, lighting, &self.meshes, self.bounds)?;
 
         let g = &self.gbuffer;
-        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
         gpu.run(|encoder| {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("subsurface_lab::renderer gbuffer"),
-                color_attachments: &[&g.albedo, &g.normal, &g.profile_id]
-                    .map(|view| Some(color_attachment(view, clear))),
-                depth_stencil_attachment: Some(depth_attachment(&g.depth, wgpu::LoadOp::Clear(0.0))),
-                ..Default::default()
-            });
+            let targets = [(&g.albedo, CLEAR), (&g.normal, CLEAR), (&g.profile_id, CLEAR)];
+            let depth = depth_attachment(&g.depth, wgpu::LoadOp::Clear(0.0));
+            let label = "subsurface_lab::renderer gbuffer";
+            let mut pass = passes::begin(encoder, label, &targets, Some(depth));
             pass.set_pipeline(&self.draw);
             pass.set_bind_group(0, &self.camera_group, &[]);
             for mesh in &self.meshes {
@@ -291,12 +242,9 @@ impl Renderer {
             }
             drop(pass);
 
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("subsurface_lab::renderer deferred"),
-                color_attachments: &[&g.irradiance, &g.specular]
-                    .map(|view| Some(color_attachment(view, clear))),
-                ..Default::default()
-            });
+            let targets = [(&g.irradiance, CLEAR), (&g.specular, CLEAR)];
+            let label = "subsurface_lab::renderer deferred";
+            let mut pass = passes::begin(encoder, label, &targets, None);
             pass.set_pipeline(&self.shade);
             pass.set_bind_group(0, &self.camera_group, &[]);
             pass.set_bind_group(2, &self.lights.group, &[]);
@@ -343,18 +291,12 @@ impl Renderer {
             bytemuck::bytes_of(&ComposeUniform { exposure, layer: (layer == Layer::Diffuse).into() }),
         );
         let g = &self.gbuffer;
-        let (_, group) = textures(
-            gpu,
-            "subsurface_lab::renderer compose",
-            Some(&self.compose_uniform),
-            &[diffuse, &g.albedo, &g.specular, &g.depth],
-        );
+        let label = "subsurface_lab::renderer compose";
+        let views = [diffuse, &g.albedo, &g.specular, &g.depth];
+        let (_, group) = textures(gpu, label, Some(&self.compose_uniform), &views);
         gpu.run(|encoder| {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("subsurface_lab::renderer compose"),
-                color_attachments: &[Some(color_attachment(picture, wgpu::LoadOp::Load))],
-                ..Default::default()
-            });
+            let targets = [(picture, wgpu::LoadOp::Load)];
+            let mut pass = passes::begin(encoder, label, &targets, None);
             pass.set_pipeline(&self.compose);
             pass.set_bind_group(0, &group, &[]);
             pass.set_scissor_rect(columns.start, 0, columns.len() as u32, self.size[1]);
@@ -363,17 +305,22 @@ impl Renderer {
     }
 }
 
-fn uniform_entry(visibility: wgpu::ShaderStages) -> wgpu::BindGroupLayoutEntry {
-    wgpu::BindGroupLayoutEntry {
-        binding: 0,
-        visibility,
-        ty: wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-        count: None,
+fn gbuffer_pipeline(
+    device: &wgpu::Device,
+    camera: &wgpu::BindGroupLayout,
+    material: &wgpu::BindGroupLayout,
+) -> wgpu::RenderPipeline {
+    let label = "subsurface_lab::renderer gbuffer";
+    let wgsl = [include_str!("material.wgsl"), include_str!("gbuffer.wgsl")];
+    let targets = [TextureFormat::Rgba16Float, TextureFormat::Rgba16Float, TextureFormat::R8Uint];
+    Pipeline {
+        groups: &[Some(camera), Some(material)],
+        targets: &targets.map(Into::into),
+        buffers: &[Mesh::VERTEX_LAYOUT],
+        depth_stencil: Some(depth_state(wgpu::CompareFunction::Greater, true)),
+        ..Pipeline::of(label, &passes::module(device, label, &wgsl), ["vs_screen", "fs_gbuffer"])
     }
+    .make(device)
 }
 
 /// A bind group of textures that a fragment shader loads from, behind a uniform buffer or not.
@@ -383,39 +330,16 @@ fn textures(
     uniform: Option<&wgpu::Buffer>,
     views: &[&TextureView],
 ) -> (wgpu::BindGroupLayout, wgpu::BindGroup) {
-    let mut layout = Vec::new();
-    let mut entries = Vec::new();
-    if let Some(buffer) = uniform {
-        layout.push(uniform_entry(wgpu::ShaderStages::FRAGMENT));
-        entries.push(wgpu::BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() });
-    }
-    for view in views {
-        let binding = layout.len() as u32;
-        let sample_type = match view.texture().format().sample_type(None, None) {
-            Some(wgpu::TextureSampleType::Uint) => wgpu::TextureSampleType::Uint,
-            _ => wgpu::TextureSampleType::Float { filterable: false },
-        };
-        layout.push(wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty: wgpu::BindingType::Texture {
-                sample_type,
-                view_dimension: wgpu::TextureViewDimension::D2,
-                multisampled: false,
-            },
-            count: None,
-        });
-        entries.push(wgpu::BindGroupEntry { binding, resource: wgpu::BindingResource::TextureView(view) });
-    }
-    let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-        label: Some(label),
-        entries: &layout,
-    });
-    let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: Some(label),
-        layout: &layout,
-        entries: &entries,
-    });
+    let uniform = uniform.into_iter();
+    let texture = |view: &&TextureView| match view.texture().format() {
+        TextureFormat::R8Uint => Slot::Uint,
+        _ => Slot::Float,
+    };
+    let slots: Vec<_> = uniform.clone().map(|_| Slot::Uniform).chain(views.iter().map(texture)).collect();
+    let views = views.iter().map(|view| BindingResource::TextureView(view));
+    let resources: Vec<_> = uniform.map(wgpu::Buffer::as_entire_binding).chain(views).collect();
+    let layout = passes::layout(&gpu.device, label, &slots);
+    let group = passes::group(&gpu.device, label, &layout, &resources);
     (layout, group)
 }
 
@@ -438,63 +362,6 @@ fn depth_attachment(
         depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
         stencil_ops: None,
     }
-}
-
-fn color_attachment(
-    view: &TextureView,
-    load: wgpu::LoadOp<wgpu::Color>,
-) -> wgpu::RenderPassColorAttachment<'_> {
-    wgpu::RenderPassColorAttachment {
-        view,
-        depth_slice: None,
-        resolve_target: None,
-        ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
-    }
-}
-
-/// What the renderer's pipelines differ in.
-struct Pipeline<'a> {
-    label: &'a str,
-    shader: &'a wgpu::ShaderModule,
-    /// Entry points.
-    vertex: &'a str,
-    fragment: &'a str,
-    groups: &'a [Option<&'a wgpu::BindGroupLayout>],
-    targets: &'a [TextureFormat],
-    /// Meshes, both sides of their triangles, or one triangle over the targets.
-    buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
-    depth_stencil: Option<wgpu::DepthStencilState>,
-}
-
-fn pipeline(gpu: &Gpu, parts: Pipeline) -> wgpu::RenderPipeline {
-    let Pipeline { label, shader, vertex, fragment, groups, targets, buffers, depth_stencil } = parts;
-    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some(label),
-        bind_group_layouts: groups,
-        immediate_size: 0,
-    });
-    let targets: Vec<_> = targets.iter().map(|&f| Some(f.into())).collect();
-    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-        label: Some(label),
-        layout: Some(&layout),
-        vertex: wgpu::VertexState {
-            module: shader,
-            entry_point: Some(vertex),
-            compilation_options: Default::default(),
-            buffers,
-        },
-        primitive: Default::default(),
-        depth_stencil,
-        multisample: Default::default(),
-        fragment: Some(wgpu::FragmentState {
-            module: shader,
-            entry_point: Some(fragment),
-            compilation_options: Default::default(),
-            targets: &targets,
-        }),
-        multiview_mask: None,
-        cache: None,
-    })
 }
 
 #[cfg(test)]

@@ -3,10 +3,11 @@
 //! `probe.wgsl`.
 
 use glam::{Vec2, Vec3, Vec4};
-use wgpu::TextureFormat;
+use wgpu::{BindingResource, TextureFormat};
 
 use super::mesh::Mesh;
-use super::{Camera, Gpu, Pipeline, Primitive, Renderer};
+use super::{Camera, Gpu, Primitive, Renderer};
+use crate::passes::{self, CLEAR, Pipeline, Slot};
 
 /// Places are lit so many at a time, in a square texture.
 const SIDE: u32 = 1024;
@@ -36,86 +37,38 @@ impl Probe {
     /// The passes for what `renderer` draws.
     pub fn new(gpu: &Gpu, renderer: &Renderer) -> Self {
         let label = "subsurface_lab::renderer probe";
-        let shader = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(
-                [include_str!("material.wgsl"), super::lighting::SHADER, include_str!("probe.wgsl")]
-                    .concat()
-                    .into(),
-            ),
-        });
-        let layout = gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some(label),
-            entries: &[wgpu::BindGroupLayoutEntry {
-                binding: 0,
-                visibility: wgpu::ShaderStages::FRAGMENT,
-                ty: wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
-                    view_dimension: wgpu::TextureViewDimension::D2Array,
-                    multisampled: false,
-                },
-                count: None,
-            }],
-        });
-        let places = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: Some(label),
-            size: wgpu::Extent3d { width: SIDE, height: SIDE, depth_or_array_layers: LAYERS },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: TextureFormat::Rgba32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
-        let group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(label),
-            layout: &layout,
-            entries: &[wgpu::BindGroupEntry {
-                binding: 0,
-                resource: wgpu::BindingResource::TextureView(&places.create_view(
-                    &wgpu::TextureViewDescriptor {
-                        dimension: Some(wgpu::TextureViewDimension::D2Array),
-                        ..Default::default()
-                    },
-                )),
-            }],
-        });
-        let visible = |fragment, targets: &[TextureFormat]| {
-            super::pipeline(
-                gpu,
-                Pipeline {
-                    label,
-                    shader: &shader,
-                    vertex: "vs_screen",
-                    fragment,
-                    groups: &[Some(&renderer.camera_layout), Some(&renderer.material_layout)],
-                    targets,
-                    buffers: &[Mesh::VERTEX_LAYOUT],
-                    depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Equal, false)),
-                },
-            )
-        };
-        let irradiance = super::pipeline(
-            gpu,
+        let device = &gpu.device;
+        let wgsl = [include_str!("material.wgsl"), super::lighting::SHADER, include_str!("probe.wgsl")];
+        let shader = passes::module(device, label, &wgsl);
+        let layout = passes::layout(device, label, &[Slot::FloatLayers]);
+        let places = gpu.layers(label, [SIDE, SIDE], LAYERS, TextureFormat::Rgba32Float);
+        let all = super::gpu::array(&places);
+        let group = passes::group(device, label, &layout, &[BindingResource::TextureView(&all)]);
+        let visible = |fragment, targets: &[wgpu::ColorTargetState]| {
             Pipeline {
-                label,
-                shader: &shader,
-                vertex: "vs_probe",
-                fragment: "fs_irradiance",
-                groups: &[
-                    Some(&renderer.camera_layout),
-                    Some(&renderer.material_layout),
-                    Some(&renderer.lights.layout),
-                    Some(&layout),
-                ],
-                targets: &[TextureFormat::Rgba32Float],
-                buffers: &[],
-                depth_stencil: None,
-            },
-        );
+                groups: &[Some(&renderer.camera_layout), Some(&renderer.material_layout)],
+                targets,
+                buffers: &[Mesh::VERTEX_LAYOUT],
+                depth_stencil: Some(super::depth_state(wgpu::CompareFunction::Equal, false)),
+                ..Pipeline::of(label, &shader, ["vs_screen", fragment])
+            }
+            .make(device)
+        };
+        let irradiance = Pipeline {
+            groups: &[
+                Some(&renderer.camera_layout),
+                Some(&renderer.material_layout),
+                Some(&renderer.lights.layout),
+                Some(&layout),
+            ],
+            targets: &[TextureFormat::Rgba32Float.into()],
+            ..Pipeline::of(label, &shader, ["vs_probe", "fs_irradiance"])
+        }
+        .make(device);
+        let numbers = || TextureFormat::Rgba32Float.into();
         Self {
-            position: visible("fs_position", &[TextureFormat::Rgba32Float]),
-            steps: visible("fs_steps", &[TextureFormat::Rgba32Float; 2]),
+            position: visible("fs_position", &[numbers()]),
+            steps: visible("fs_steps", &[numbers(), numbers()]),
             irradiance,
             places,
             group,
@@ -128,21 +81,12 @@ impl Probe {
         let label = "subsurface_lab::renderer visible";
         let [position, x, y] =
             [(); 3].map(|()| gpu.target(label, renderer.size, TextureFormat::Rgba32Float));
-        let clear = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
         gpu.run(|encoder| {
             // Three targets are more bytes a pixel than every device has to allow.
             for (pipeline, targets) in [(&self.position, &[&position][..]), (&self.steps, &[&x, &y])] {
-                let attachments: Vec<_> =
-                    targets.iter().map(|target| Some(super::color_attachment(target, clear))).collect();
-                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some(label),
-                    color_attachments: &attachments,
-                    depth_stencil_attachment: Some(super::depth_attachment(
-                        &renderer.gbuffer.depth,
-                        wgpu::LoadOp::Load,
-                    )),
-                    ..Default::default()
-                });
+                let targets: Vec<_> = targets.iter().map(|target| (*target, CLEAR)).collect();
+                let depth = super::depth_attachment(&renderer.gbuffer.depth, wgpu::LoadOp::Load);
+                let mut pass = passes::begin(encoder, label, &targets, Some(depth));
                 pass.set_pipeline(pipeline);
                 pass.set_bind_group(0, &renderer.camera_group, &[]);
                 for mesh in &renderer.meshes {
@@ -191,14 +135,8 @@ impl Probe {
                 wgpu::Extent3d { width: SIDE, height: rows, depth_or_array_layers: LAYERS },
             );
             gpu.run(|encoder| {
-                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("subsurface_lab::renderer probe"),
-                    color_attachments: &[Some(super::color_attachment(
-                        &self.lit,
-                        wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    ))],
-                    ..Default::default()
-                });
+                let label = "subsurface_lab::renderer probe";
+                let mut pass = passes::begin(encoder, label, &[(&self.lit, CLEAR)], None);
                 pass.set_scissor_rect(0, 0, SIDE, rows);
                 pass.set_pipeline(&self.irradiance);
                 pass.set_bind_group(0, &renderer.camera_group, &[]);

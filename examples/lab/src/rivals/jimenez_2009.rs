@@ -8,14 +8,15 @@ use crate::Error;
 use glam::DVec3;
 use subsurface::Frame;
 use subsurface::wgpu::{
-    self, BindGroup, BindingResource, BlendFactor, Color, ColorWrites, CommandEncoder, Device, LoadOp,
-    Queue, Sampler, TextureFormat, TextureView,
+    self, BindGroup, BindingResource, BlendFactor, Color, ColorTargetState, ColorWrites, CommandEncoder,
+    Device, LoadOp, Queue, Sampler, TextureFormat, TextureView,
 };
 
 use super::copy::Copy;
 use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN, over_skin};
-use super::pass::{CLEAR, Pass, Slot, Target, linear_sampler, scratch, size};
+use super::pass::{CLEAR, Pass, Slot, scratch, size};
 use crate::method::ScreenMethod;
+use crate::passes::linear_sampler;
 
 /// Skin as the paper has it, in four Gaussians (variance in mm², weights of red, green and blue);
 /// the narrowest is the pixel itself.
@@ -65,7 +66,7 @@ impl Jimenez2009 {
         }
         let shader = [SCREEN, include_str!("seven_taps.wgsl"), include_str!("jimenez_2009.wgsl")].concat();
         let slots = [Slot::Uniform, Slot::Filtered, Slot::Sampler, Slot::Uint];
-        let sum = Target {
+        let sum = ColorTargetState {
             format,
             blend: Some(wgpu::BlendState {
                 color: wgpu::BlendComponent {
@@ -75,7 +76,7 @@ impl Jimenez2009 {
                 },
                 alpha: wgpu::BlendComponent::REPLACE,
             }),
-            writes: ColorWrites::COLOR,
+            write_mask: ColorWrites::COLOR,
         };
         let mut blurs = Vec::new();
         let (mut before_mm2, mut so_far) = SKIN[0];
@@ -84,7 +85,7 @@ impl Jimenez2009 {
             let share = weight / so_far;
             let sigma_mm = (variance_mm2 - before_mm2).sqrt();
             before_mm2 = variance_mm2;
-            let pass = |entry_point, targets: &[Target]| {
+            let pass = |entry_point, targets: &[ColorTargetState]| {
                 over_skin(
                     device,
                     &format!("rivals jimenez_2009 {entry_point}"),
@@ -96,7 +97,7 @@ impl Jimenez2009 {
             };
             blurs.push(Blur {
                 rows: pass("fs_rows", &[COLOR.into()]),
-                columns: pass("fs_columns", &[COLOR.into(), sum]),
+                columns: pass("fs_columns", &[COLOR.into(), sum.clone()]),
                 share: Color { r: share.x, g: share.y, b: share.z, a: 1.0 },
             });
         }
@@ -104,7 +105,7 @@ impl Jimenez2009 {
             packed: Packed::new(device, format),
             copy: Copy::new(device, format),
             blurs,
-            linear: linear_sampler(device),
+            linear: linear_sampler(device, "rivals jimenez_2009"),
             scratch: None,
             prepared: None,
         })

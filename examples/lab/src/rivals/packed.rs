@@ -5,10 +5,11 @@ use glam::Vec4;
 use subsurface::Frame;
 use subsurface::wgpu::util::DeviceExt;
 use subsurface::wgpu::{
-    self, BindGroup, Buffer, Color, CommandEncoder, Device, LoadOp, TextureFormat, TextureView,
+    self, BindGroup, Buffer, Color, ColorTargetState, CommandEncoder, Device, LoadOp, TextureFormat,
+    TextureView,
 };
 
-use super::pass::{self, CLEAR, Over, Pass, STENCIL, Slot, TRIANGLE, Target, scratch, size};
+use super::pass::{self, CLEAR, Over, Pass, STENCIL, Slot, TRIANGLE, scratch, size};
 
 /// Color, for which the papers take half floats.
 pub const COLOR: TextureFormat = TextureFormat::Rgba16Float;
@@ -51,7 +52,7 @@ pub fn over_skin(
     label: &str,
     shader: (&str, &str),
     slots: &[Slot],
-    targets: &[Target],
+    targets: &[ColorTargetState],
     constants: &[(&str, f64)],
 ) -> Pass {
     Pass::over(Over::Skin, device, label, shader, slots, targets, constants)

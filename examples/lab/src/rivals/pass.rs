@@ -1,36 +1,12 @@
 //! A full-screen pass, and the textures that passes hand to each other.
 
 use subsurface::wgpu::{
-    self, BindGroup, BindGroupLayout, BindingResource, BindingType, BlendState, Color, ColorWrites,
-    CommandEncoder, Device, LoadOp, RenderPipeline, SamplerBindingType, TextureFormat, TextureSampleType,
-    TextureView,
+    self, BindGroup, BindGroupLayout, BindingResource, Color, ColorTargetState, CommandEncoder, Device,
+    LoadOp, RenderPipeline, TextureFormat, TextureView,
 };
 
-/// What a binding is; a pass numbers its bindings from 0 in their order.
-#[derive(Clone, Copy)]
-pub enum Slot {
-    Uniform,
-    /// Loaded, of any float or depth format.
-    Float,
-    /// Sampled with filtering.
-    Filtered,
-    Uint,
-    Sampler,
-}
-
-/// Where a pass writes.
-#[derive(Clone, Copy)]
-pub struct Target {
-    pub format: TextureFormat,
-    pub blend: Option<BlendState>,
-    pub writes: ColorWrites,
-}
-
-impl From<TextureFormat> for Target {
-    fn from(format: TextureFormat) -> Self {
-        Self { format, blend: None, writes: ColorWrites::ALL }
-    }
-}
+use crate::passes::{self, Pipeline};
+pub use crate::passes::{CLEAR, Slot};
 
 /// Which pixels a pass draws.
 #[derive(Clone, Copy, PartialEq)]
@@ -85,7 +61,7 @@ impl Pass {
         label: &str,
         shader: (&str, &str),
         slots: &[Slot],
-        targets: &[Target],
+        targets: &[ColorTargetState],
         constants: &[(&str, f64)],
     ) -> Self {
         Self::over(Over::All, device, label, shader, slots, targets, constants)
@@ -98,78 +74,25 @@ impl Pass {
         label: &str,
         (wgsl, entry_point): (&str, &str),
         slots: &[Slot],
-        targets: &[Target],
+        targets: &[ColorTargetState],
         constants: &[(&str, f64)],
     ) -> Self {
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(label),
-            source: wgpu::ShaderSource::Wgsl(wgsl.into()),
-        });
-        let entries: Vec<_> = slots
-            .iter()
-            .zip(0..)
-            .map(|(slot, binding)| wgpu::BindGroupLayoutEntry {
-                binding,
-                visibility: wgpu::ShaderStages::FRAGMENT,
-                ty: slot.binding_type(),
-                count: None,
-            })
-            .collect();
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some(label),
-            entries: &entries,
-        });
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(label),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let targets: Vec<_> = targets
-            .iter()
-            .map(|target| {
-                Some(wgpu::ColorTargetState {
-                    format: target.format,
-                    blend: target.blend,
-                    write_mask: target.writes,
-                })
-            })
-            .collect();
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some(label),
-            layout: Some(&pipeline_layout),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("vs_main"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: Default::default(),
+        let layout = passes::layout(device, label, slots);
+        let shader = passes::module(device, label, &[wgsl]);
+        let pipeline = Pipeline {
+            groups: &[Some(&layout)],
+            targets,
             depth_stencil: over.depth_stencil(),
-            multisample: Default::default(),
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some(entry_point),
-                compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
-                targets: &targets,
-            }),
-            multiview_mask: None,
-            cache: None,
-        });
+            constants,
+            ..Pipeline::of(label, &shader, ["vs_main", entry_point])
+        }
+        .make(device);
         Self { label: label.into(), over, layout, pipeline }
     }
 
     /// Binds the resources, in the order of the slots.
     pub fn bind(&self, device: &Device, resources: &[BindingResource]) -> BindGroup {
-        let entries: Vec<_> = resources
-            .iter()
-            .zip(0..)
-            .map(|(resource, binding)| wgpu::BindGroupEntry { binding, resource: resource.clone() })
-            .collect();
-        device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some(&self.label),
-            layout: &self.layout,
-            entries: &entries,
-        })
+        passes::group(device, &self.label, &self.layout, resources)
     }
 
     /// Draws over targets that need not hold anything yet.
@@ -188,30 +111,16 @@ pub fn draw(
     stencil: Option<&TextureView>,
     blend_constant: Color,
 ) {
-    let attachments: Vec<_> = targets
-        .iter()
-        .map(|&(view, load)| {
-            Some(wgpu::RenderPassColorAttachment {
-                view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
-            })
-        })
-        .collect();
     // Read only, but where it is marked.
     let marks = draws.iter().any(|(pass, _)| pass.over == Over::Marking);
-    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: draws.first().map(|(pass, _)| pass.label.as_str()),
-        color_attachments: &attachments,
-        depth_stencil_attachment: stencil.map(|view| wgpu::RenderPassDepthStencilAttachment {
-            view,
-            depth_ops: None,
-            stencil_ops: marks
-                .then_some(wgpu::Operations { load: LoadOp::Clear(0), store: wgpu::StoreOp::Store }),
-        }),
-        ..Default::default()
+    let stencil = stencil.map(|view| wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: None,
+        stencil_ops: marks
+            .then_some(wgpu::Operations { load: LoadOp::Clear(0), store: wgpu::StoreOp::Store }),
     });
+    let label = draws.first().map_or("", |(pass, _)| &pass.label);
+    let mut pass = passes::begin(encoder, label, targets, stencil);
     pass.set_blend_constant(blend_constant);
     pass.set_stencil_reference(SKIN);
     for (drawn, group) in draws {
@@ -223,40 +132,6 @@ pub fn draw(
 
 /// The vertex shader of every pass.
 pub const TRIANGLE: &str = include_str!("triangle.wgsl");
-
-/// For targets of which every pixel is written, or that start from nothing.
-pub const CLEAR: LoadOp<Color> = LoadOp::Clear(Color::TRANSPARENT);
-
-impl Slot {
-    fn binding_type(self) -> BindingType {
-        let texture = |sample_type| BindingType::Texture {
-            sample_type,
-            view_dimension: wgpu::TextureViewDimension::D2,
-            multisampled: false,
-        };
-        match self {
-            Self::Uniform => BindingType::Buffer {
-                ty: wgpu::BufferBindingType::Uniform,
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            Self::Float => texture(TextureSampleType::Float { filterable: false }),
-            Self::Filtered => texture(TextureSampleType::Float { filterable: true }),
-            Self::Uint => texture(TextureSampleType::Uint),
-            Self::Sampler => BindingType::Sampler(SamplerBindingType::Filtering),
-        }
-    }
-}
-
-/// Bilinear, clamped to the edge.
-pub fn linear_sampler(device: &Device) -> wgpu::Sampler {
-    device.create_sampler(&wgpu::SamplerDescriptor {
-        label: Some("rivals linear"),
-        mag_filter: wgpu::FilterMode::Linear,
-        min_filter: wgpu::FilterMode::Linear,
-        ..Default::default()
-    })
-}
 
 /// Width and height in pixels.
 pub fn size(view: &TextureView) -> [u32; 2] {

@@ -15,8 +15,9 @@ use subsurface::{Frame, Profile};
 
 use super::edge::{Responses, minimise, step, terms, vec3f};
 use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN, over_skin};
-use super::pass::{CLEAR, Pass, Slot, linear_sampler, scratch, size};
+use super::pass::{CLEAR, Pass, Slot, scratch, size};
 use crate::method::ScreenMethod;
+use crate::passes::linear_sampler;
 
 /// Depth difference, as a multiple of the kernel's width, from which a tap takes the center's
 /// light. The demo has s = 300 · distance to the projection window · `sssWidth` · |Δz| in units of
@@ -196,7 +197,7 @@ impl Separable {
             packed: Packed::new(device, format),
             rows: pass("fs_rows", COLOR),
             columns: pass("fs_columns", format),
-            linear: linear_sampler(device),
+            linear: linear_sampler(device, "rivals separable"),
             taps: 2 * kernel.weights.len() - 1,
             scratch: None,
             prepared: None,

@@ -16,8 +16,9 @@ use subsurface::{Atlas, Profile};
 use super::atlas::{ATLAS, Gutter, uniform};
 use super::edge::{terms, vec3f};
 use super::packed::COLOR;
-use super::pass::{Pass, Slot, TRIANGLE, linear_sampler, scratch, size, texture};
+use super::pass::{Pass, Slot, TRIANGLE, scratch, size, texture};
 use crate::method::AtlasMethod;
+use crate::passes::linear_sampler;
 
 const STRETCH: TextureFormat = TextureFormat::Rg16Float;
 
@@ -84,7 +85,7 @@ impl TextureCascade {
                 &[],
             ),
             gutter: Gutter::new(device, format),
-            linear: linear_sampler(device),
+            linear: linear_sampler(device, "rivals texture_cascade"),
             scratch: None,
             blurred: Vec::new(),
             prepared: None,

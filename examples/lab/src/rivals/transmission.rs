@@ -5,14 +5,14 @@
 //! turned around. Here they get the truth, the layer behind: thickness along the camera's axis, and light.
 
 use subsurface::wgpu::{
-    self, BindGroup, BindingResource, Color, ColorWrites, CommandEncoder, Device, LoadOp, Queue,
-    TextureFormat, TextureView,
+    self, BindGroup, BindingResource, Color, ColorTargetState, ColorWrites, CommandEncoder, Device, LoadOp,
+    Queue, TextureFormat, TextureView,
 };
 use subsurface::{Frame, Profile};
 
 use super::edge::{terms, vec3f};
 use super::packed::{SCREEN, uniform_buffer};
-use super::pass::{self, Pass, Slot, Target};
+use super::pass::{self, Pass, Slot};
 use super::{burley_disk, separable};
 use crate::Error;
 use crate::method::ScreenMethod;
@@ -59,7 +59,7 @@ impl Transmission {
                 "rivals transmission",
                 (&[SCREEN, include_str!("transmission.wgsl"), transmittance].concat(), "fs_transmission"),
                 &[Slot::Uniform, Slot::Float, Slot::Uint, Slot::Float, Slot::Float],
-                &[Target { format, blend, writes: ColorWrites::COLOR }],
+                &[ColorTargetState { format, blend, write_mask: ColorWrites::COLOR }],
                 &[],
             ),
             prepared: None,
