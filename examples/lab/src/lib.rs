@@ -40,6 +40,7 @@ pub mod truth;
 #[cfg(feature = "programs")]
 pub mod uses;
 #[cfg(test)]
+#[path = "../../../src/wgsl/structs.rs"]
 mod wgsl;
 
 pub use error::Error;

@@ -374,10 +374,9 @@ impl Set {
         effects: &mut Effects,
         look: &Look,
         layer: Layer,
-        mut passes: Option<&mut Vec<Pass>>,
+        passes: Option<&mut Vec<Pass>>,
     ) -> Result<Scattered, Error> {
-        let (gpu, renderer) = (&stage.gpu, &self.renderer);
-        let fallen = &renderer.gbuffer.irradiance;
+        let fallen = &self.renderer.gbuffer.irradiance;
         let mut title = layer.title().to_owned();
         let plan = match (layer, &look.plan) {
             (Layer::Screen, Some(plan)) => {
@@ -390,53 +389,76 @@ impl Set {
                 return Ok(Scattered { title, irradiance: fallen.clone(), taken_ms: None });
             }
         };
-        let output = self.outputs.entry(layer).or_insert_with(|| renderer.scattered_target(gpu));
-        let format = output.texture().format();
+        self.outputs.entry(layer).or_insert_with(|| self.renderer.scattered_target(&stage.gpu));
         let since = Instant::now();
         match plan {
-            Some(plan) => {
-                let ours = match effects.screen.entry(layer) {
-                    Entry::Occupied(kept) => kept.into_mut(),
-                    Entry::Vacant(none) => none.insert(Ours::new(&gpu.device, format, &plan)?),
-                };
-                if *ours.effect.plan() != plan {
-                    ours.effect = ScreenSpace::new(&gpu.device, format, &plan)?;
-                }
-                let projection = look.camera.projection(self.size);
-                let mut frame = renderer.gbuffer.frame(projection, stage.mm_per_unit);
-                frame.back = self.back.as_ref().filter(|_| look.has_back).map(BackRenderer::layer);
-                let Ours { effect, view } = ours;
-                view.prepare(&gpu.device, &gpu.queue, effect, &frame)?;
-                let times = effects.timestamps.as_ref().zip(passes);
-                passes::run(gpu, times, |encoder, queries| match queries {
-                    Some(queries) => view.render_timed(encoder, output, queries, 0),
-                    None => view.render(encoder, output).map(|()| Vec::new()),
-                })?;
-            }
+            Some(plan) => self.run_plan(stage, effects, look, (layer, &plan), passes)?,
             None => {
                 title = format!("{title}, {0}×{0}", stage.texture_size);
-                let effect = match effects.texture.take() {
-                    Some((profile, effect)) if profile == look.profile => effect,
-                    _ => OursUnrolled::new(&gpu.device, format, &[look.profile])?,
-                };
-                let (_, OursUnrolled { effect, view }) = effects.texture.insert((look.profile, effect));
-                if self.atlas.is_none() {
-                    self.atlas = Some(AtlasRenderer::new(gpu, renderer, stage.texture_size)?);
-                }
-                let scatter = |atlas: &Atlas, to: &TextureView| {
-                    view.prepare(&gpu.device, &gpu.queue, effect, atlas)?;
-                    let times = effects.timestamps.as_ref().zip(passes.as_deref_mut());
-                    passes::run(gpu, times, |encoder, queries| match queries {
-                        Some(queries) => view.render_timed(encoder, to, queries, 0),
-                        None => view.render(encoder, to).map(|()| Vec::new()),
-                    })
-                };
-                if let Some(atlas) = &self.atlas {
-                    atlas.render(gpu, renderer, 1, stage.mm_per_unit, output, scatter)?;
-                }
+                self.run_atlas(stage, effects, look, passes)?;
             }
         }
-        Ok(Scattered { title, irradiance: output.clone(), taken_ms: Some(ms(since)) })
+        Ok(Scattered { title, irradiance: self.outputs[&layer].clone(), taken_ms: Some(ms(since)) })
+    }
+
+    fn run_plan(
+        &self,
+        stage: &Stage,
+        effects: &mut Effects,
+        look: &Look,
+        (layer, plan): (Layer, &Plan),
+        passes: Option<&mut Vec<Pass>>,
+    ) -> Result<(), Error> {
+        let (gpu, output) = (&stage.gpu, &self.outputs[&layer]);
+        let format = output.texture().format();
+        let ours = match effects.screen.entry(layer) {
+            Entry::Occupied(kept) => kept.into_mut(),
+            Entry::Vacant(none) => none.insert(Ours::new(&gpu.device, format, plan)?),
+        };
+        if ours.effect.plan() != plan {
+            ours.effect = ScreenSpace::new(&gpu.device, format, plan)?;
+        }
+        let projection = look.camera.projection(self.size);
+        let mut frame = self.renderer.gbuffer.frame(projection, stage.mm_per_unit);
+        frame.back = self.back.as_ref().filter(|_| look.has_back).map(BackRenderer::layer);
+        let Ours { effect, view } = ours;
+        view.prepare(&gpu.device, &gpu.queue, effect, &frame)?;
+        let times = effects.timestamps.as_ref().zip(passes);
+        passes::run(gpu, times, |encoder, queries| match queries {
+            Some(queries) => view.render_timed(encoder, output, queries, 0),
+            None => view.render(encoder, output).map(|()| Vec::new()),
+        })
+    }
+
+    fn run_atlas(
+        &mut self,
+        stage: &Stage,
+        effects: &mut Effects,
+        look: &Look,
+        mut passes: Option<&mut Vec<Pass>>,
+    ) -> Result<(), Error> {
+        let (gpu, output) = (&stage.gpu, &self.outputs[&Layer::Texture]);
+        let format = output.texture().format();
+        let effect = match effects.texture.take() {
+            Some((profile, effect)) if profile == look.profile => effect,
+            _ => OursUnrolled::new(&gpu.device, format, &[look.profile])?,
+        };
+        let (_, OursUnrolled { effect, view }) = effects.texture.insert((look.profile, effect));
+        if self.atlas.is_none() {
+            self.atlas = Some(AtlasRenderer::new(gpu, &self.renderer, stage.texture_size)?);
+        }
+        let scatter = |atlas: &Atlas, to: &TextureView| {
+            view.prepare(&gpu.device, &gpu.queue, effect, atlas)?;
+            let times = effects.timestamps.as_ref().zip(passes.as_deref_mut());
+            passes::run(gpu, times, |encoder, queries| match queries {
+                Some(queries) => view.render_timed(encoder, to, queries, 0),
+                None => view.render(encoder, to).map(|()| Vec::new()),
+            })
+        };
+        if let Some(atlas) = &self.atlas {
+            atlas.render(gpu, &self.renderer, 1, stage.mm_per_unit, output, scatter)?;
+        }
+        Ok(())
     }
 
     fn width(&self, stage: &Stage, look: &Look) -> Result<Shot, Error> {

@@ -3,6 +3,7 @@
 
 use std::time::Instant;
 
+use serde::{Deserialize, Serialize};
 use subsurface::wgpu::TextureView;
 
 use crate::Error;
@@ -99,6 +100,7 @@ impl Clock {
 }
 
 /// What a frame takes of a host's CPU.
+#[derive(Deserialize, Serialize)]
 pub struct HostCost {
     /// Checking and uploading, in µs.
     pub prepare_us: f64,

@@ -19,7 +19,7 @@ use crate::chart::row::Row;
 use crate::chart::scene::{Head, Scene, Surface, rgb};
 use crate::chart::score::{Knows, Score};
 use crate::chart::truths::Truths;
-use crate::chart::turning;
+use crate::chart::turning::{self, Turned};
 use crate::method::{self, AtlasMethod, Ours, OursUnrolled, ScreenMethod};
 use crate::metrics;
 use crate::renderer::{AtlasRenderer, Gpu, Scene as Model};
@@ -171,18 +171,12 @@ impl<'a> Lab<'a> {
         let rounds = self.plan.rounds;
         self.begin(format!("{}: timing", scene.name), rounds.compared);
         let times = clock::rounds(gpu, &self.clock, &timed, rounds, || self.bar.inc(1))?;
-        for (name, setting, method) in &mut methods {
-            if !name.starts_with("screen_") {
-                continue;
-            }
-            let cost = clock::host_cost(gpu, &mut **method, &frame, &output, HOST_FRAMES)?;
+        for (name, setting, method) in methods.iter_mut().filter(|(name, ..)| name.starts_with("screen_")) {
             done.host.push(Host {
                 scene: scene.name.clone(),
                 method: name.to_string(),
                 setting: setting.clone(),
-                prepare_us: cost.prepare_us,
-                render_us: cost.render_us,
-                upload_bytes: cost.upload_bytes,
+                cost: clock::host_cost(gpu, &mut **method, &frame, &output, HOST_FRAMES)?,
             });
         }
 
@@ -212,6 +206,21 @@ impl<'a> Lab<'a> {
         Ok(metrics::median(&times[0]))
     }
 
+    /// Those in texture space that are wanted, with the side of their atlas.
+    fn atlas_methods(&self, scene: &Scene) -> Result<Vec<(u32, rivals::Atlas)>, Error> {
+        let mut methods: Vec<(u32, rivals::Atlas)> = Vec::new();
+        for size in self.plan.atlases {
+            let ours = OursUnrolled::new(&self.gpu.device, OUTPUT, &[Profile::SKIN])?;
+            methods.push((*size, ("texture_separable", String::new(), Box::new(ours))));
+            let rivals = rivals::atlas(&self.gpu.device, OUTPUT, &Profile::SKIN);
+            methods.extend(rivals.into_iter().map(|rival| (*size, rival)));
+        }
+        // One timed run at one head is enough for the full convolution: it takes long.
+        let has_2d = |size| scene.name == "front" && size == self.plan.atlas_2d;
+        methods.retain(|(size, (name, ..))| self.wanted(name) && (*name != "texture_2d" || has_2d(*size)));
+        Ok(methods)
+    }
+
     /// Every method in texture space.
     fn textures(
         &self,
@@ -223,21 +232,10 @@ impl<'a> Lab<'a> {
     ) -> Result<(), Error> {
         let name = format!("{}, texture space", scene.name);
         let mut images = images_of(&name, score, Knows::Mesh);
-        let mut methods: Vec<(&str, u32, Box<dyn AtlasMethod>)> = Vec::new();
-        for size in self.plan.atlases {
-            let ours = OursUnrolled::new(&self.gpu.device, OUTPUT, &[Profile::SKIN])?;
-            methods.push(("texture_separable", *size, Box::new(ours)));
-            for (name, _, method) in rivals::atlas(&self.gpu.device, OUTPUT, &Profile::SKIN) {
-                // One timed run at one head is enough for the full convolution: it takes long.
-                if name != "texture_2d" || scene.name == "front" && *size == self.plan.atlas_2d {
-                    methods.push((name, *size, method));
-                }
-            }
-        }
-        methods.retain(|(name, ..)| self.wanted(name));
+        let methods = self.atlas_methods(scene)?;
         self.begin(name, methods.len());
         let output = self.gpu.target("scattered", scene.size, OUTPUT);
-        for (name, size, mut method) in methods {
+        for (size, (name, _, mut method)) in methods {
             let atlas = AtlasRenderer::new(&self.gpu, &head.renderer, size)?;
             let mut run = || {
                 let (gpu, mm) = (&self.gpu, scene.mm_per_unit);
@@ -374,37 +372,9 @@ impl<'a> Lab<'a> {
         let (gpu, mm) = (&self.gpu, self.options.mm_per_unit);
         let (scene, none, turned) =
             turning::figure(gpu, &self.model, mm, &self.plan, &mut methods, || self.bar.inc(1))?;
-        let mut done = Done::default();
-        done.notes.push(
-            "turning: all are held to the visible integral, texture space, too, which knows of more light."
-                .into(),
-        );
-        let copy_ms = turned.first().map_or(f64::NAN, |copy| copy.ms);
-        let all = [("none", String::new(), &none)].into_iter();
-        let all =
-            all.chain(names.iter().zip(&turned).map(|((name, setting), t)| (*name, setting.clone(), t)));
-        for (name, setting, turned) in all {
-            let percent = |error: f64| format!("{:.2} %", 100.0 * error);
-            let [least, median, worst] = turned.spread().map(percent);
-            let rest = turned
-                .by_turning()
-                .map(|times| format!("; over the same light at rest at most {times:.4}"));
-            done.notes.push(format!(
-                "turning: {}: {} in the first of {} frames, {least} to {worst}, median {median}, {} over all{}.",
-                format!("{name} {setting}").trim_end(),
-                percent(turned.errors[0]),
-                turned.errors.len(),
-                percent(turned.rms()),
-                rest.unwrap_or_default(),
-            ));
-            if turned.ms.is_finite() {
-                let rel_rmse_visible = (name != "copy").then(|| turned.rms());
-                let x_copy = turned.ms / copy_ms;
-                let row = empty_row(&scene, name, &setting);
-                done.rows.push(Row { ms: turned.ms, x_copy, rel_rmse_visible, ..row });
-            }
-        }
-        Ok(done)
+        let names = names.iter().map(|(name, setting)| (*name, &**setting));
+        let all = std::iter::once((("none", ""), &none)).chain(names.zip(&turned));
+        Ok(turning_figures(&scene, all, turned.first().map_or(f64::NAN, |copy| copy.ms)))
     }
 
     /// Li & Shao's Fig. 8.
@@ -466,6 +436,40 @@ fn images_of(scene: &str, score: &Score, knows: Knows) -> SceneImages {
         truth: thumbnail(score.picture(score.truth(knows))),
         entries: Vec::new(),
     }
+}
+
+/// What is said of methods, by their names and settings, while the light turns.
+fn turning_figures<'a>(
+    scene: &Scene,
+    all: impl Iterator<Item = ((&'a str, &'a str), &'a Turned)>,
+    copy_ms: f64,
+) -> Done {
+    let mut done = Done::default();
+    done.notes.push(
+        "turning: all are held to the visible integral, texture space, too, which knows of more light."
+            .into(),
+    );
+    for ((name, setting), turned) in all {
+        let percent = |error: f64| format!("{:.2} %", 100.0 * error);
+        let [least, median, worst] = turned.spread().map(percent);
+        let rest =
+            turned.by_turning().map(|times| format!("; over the same light at rest at most {times:.4}"));
+        done.notes.push(format!(
+            "turning: {}: {} in the first of {} frames, {least} to {worst}, median {median}, {} over all{}.",
+            format!("{name} {setting}").trim_end(),
+            percent(turned.errors[0]),
+            turned.errors.len(),
+            percent(turned.rms()),
+            rest.unwrap_or_default(),
+        ));
+        if turned.ms.is_finite() {
+            let rel_rmse_visible = (name != "copy").then(|| turned.rms());
+            let x_copy = turned.ms / copy_ms;
+            let row = empty_row(scene, name, setting);
+            done.rows.push(Row { ms: turned.ms, x_copy, rel_rmse_visible, ..row });
+        }
+    }
+    done
 }
 
 fn interval(scene: &Scene, method: &str, setting: &str, runs: usize, interval_95: [f64; 2]) -> Interval {

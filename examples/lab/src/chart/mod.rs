@@ -206,9 +206,9 @@ fn host_note(host: &[&Host]) -> Option<String> {
         format!(
             "{} prepares in {:.0} µs, staging {} bytes, and records in {:.0} µs",
             name.trim_end(),
-            of(|h| h.prepare_us),
-            of(|h| h.upload_bytes as f64),
-            of(|h| h.render_us),
+            of(|h| h.cost.prepare_us),
+            of(|h| h.cost.upload_bytes as f64),
+            of(|h| h.cost.render_us),
         )
     };
     let methods = plot::style::distinct(names.iter().map(String::as_str));

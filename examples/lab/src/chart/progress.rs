@@ -9,6 +9,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
+use crate::chart::clock::HostCost;
 use crate::chart::plot::Series;
 use crate::chart::report::SceneImages;
 use crate::chart::row::Row;
@@ -52,12 +53,8 @@ pub struct Host {
     pub scene: String,
     pub method: String,
     pub setting: String,
-    /// Checking and uploading.
-    pub prepare_us: f64,
-    /// Recording, until the commands are ready to be submitted.
-    pub render_us: f64,
-    /// Memory that uploads are staged in.
-    pub upload_bytes: isize,
+    #[serde(flatten)]
+    pub cost: HostCost,
 }
 
 /// [`SceneImages`] as PNG in base64.

@@ -278,6 +278,24 @@ fn edge(gpu: &Gpu, size: [u32; 2], sigma_px: f64, stride: u32) -> Scene {
     })
 }
 
+/// What a pixel shows.
+fn pixel(h: &Hit, irradiance: f32, px_per_mm: f64, beside: impl Fn(i32, i32) -> Option<Vec3>) -> Pixel {
+    // On the tangent plane, down being −y in mm.
+    let step = |x: f64, y: f64| {
+        let z = -(x * h.normal.x + y * h.normal.y) / h.normal.z;
+        DVec3::new(x, y, z) / px_per_mm
+    };
+    let tangents = [step(1.0, 0.0), step(0.0, -1.0)];
+    Pixel {
+        patch: Patch {
+            point_mm: h.point_mm.as_vec3(),
+            area_mm2: tangents[0].cross(tangents[1]).length() as f32,
+            irradiance: Vec3::splat(irradiance),
+        },
+        steps_mm: even_steps(tangents.map(|t| t.as_vec3()), px_per_mm.recip() as f32, beside),
+    }
+}
+
 /// A surface over the xy plane, seen along −Z from half a metre, in mm.
 fn orthographic(
     gpu: &Gpu,
@@ -295,44 +313,30 @@ fn orthographic(
         DVec4::new(0.0, 0.0, 1e-3, 0.0),
         DVec4::new(0.0, 0.0, 1.0, 1.0),
     );
-    let (mut irradiance, mut depth, mut id) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut skin, mut hits) = (Vec::new(), Vec::new());
-    for y in 0..size[1] {
-        for x in 0..size[0] {
-            let at = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5) / px_per_mm - half;
-            let found = hit(DVec2::new(at.x, -at.y));
-            let e = found.as_ref().map_or(0.0, |h| h.irradiance);
-            let bits = [e, e, e, 1.0].map(|c| f16::from_f64(c).to_bits());
-            irradiance.push(bits);
-            depth.push(
-                found.as_ref().map_or(0.0, |h| (projection.z_axis.z * (h.point_mm.z - 500.0) + 1.0) as f32),
-            );
-            id.push(u8::from(found.is_some()));
-            skin.push(found.is_some());
-            hits.push(found);
-        }
-    }
+    let places = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y]));
+    let hits: Vec<Option<Hit>> = places
+        .map(|place| {
+            let at = DVec2::from(place.map(|p| f64::from(p) + 0.5)) / px_per_mm - half;
+            hit(DVec2::new(at.x, -at.y))
+        })
+        .collect();
+    let bits = |h: &Option<Hit>| {
+        let e = h.as_ref().map_or(0.0, |h| h.irradiance);
+        [e, e, e, 1.0].map(|c| f16::from_f64(c).to_bits())
+    };
+    let irradiance: Vec<_> = hits.iter().map(bits).collect();
+    let clip = |h: &Hit| (projection.z_axis.z * (h.point_mm.z - 500.0) + 1.0) as f32;
+    let depth: Vec<_> = hits.iter().map(|h| h.as_ref().map_or(0.0, clip)).collect();
+    let skin: Vec<bool> = hits.iter().map(Option::is_some).collect();
+    let id: Vec<u8> = skin.iter().map(|is_skin| u8::from(*is_skin)).collect();
     let (mut pixels, mut known) = (Vec::new(), Vec::new());
     for (i, h) in hits.iter().enumerate() {
         let Some(h) = h else { continue };
-        // On the tangent plane, down being −y in mm.
-        let step = |x: f64, y: f64| {
-            let z = -(x * h.normal.x + y * h.normal.y) / h.normal.z;
-            DVec3::new(x, y, z) / px_per_mm
-        };
-        let tangents = [step(1.0, 0.0), step(0.0, -1.0)];
         let beside = |x, y| {
             let there = hits[skin_beside(&skin, size, i, x, y)?].as_ref()?;
             Some((there.point_mm - h.point_mm).as_vec3())
         };
-        pixels.push(Pixel {
-            patch: Patch {
-                point_mm: h.point_mm.as_vec3(),
-                area_mm2: tangents[0].cross(tangents[1]).length() as f32,
-                irradiance: Vec3::splat(f16::from_bits(irradiance[i][0]).to_f32()),
-            },
-            steps_mm: even_steps(tangents.map(|t| t.as_vec3()), px_per_mm.recip() as f32, beside),
-        });
+        pixels.push(pixel(h, f16::from_bits(irradiance[i][0]).to_f32(), px_per_mm, beside));
         known.push(h.scattered.as_vec3());
     }
     Scene {

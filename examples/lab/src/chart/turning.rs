@@ -74,24 +74,10 @@ pub fn figure(
     methods: &mut [Method],
     mut step: impl FnMut(),
 ) -> Result<(Scene, Turned, Vec<Turned>), Error> {
-    let size = plan.size.map(|s| s / 2);
-    let camera = Camera::framing(model, View::Front, size);
-    let mut scene = Scene::head(gpu, model, mm_per_unit, "turning", size, camera)?;
-    scene.stride = 2 * plan.stride;
     let studio = Environment::studio();
     let mut lighting = Lighting::default();
-    if let Surface::Head(head) = &mut scene.surface {
-        head.renderer.set_environment(gpu, &studio);
-    }
-
-    // Of the pixels that are asked for: skin less its rim, as places among those of skin.
-    let inner = metrics::erode(&scene.skin, size[0], size[1], 1);
-    let mut among = vec![usize::MAX; scene.skin.len()];
-    let skin: Vec<usize> = (0..scene.skin.len()).filter(|i| scene.skin[*i]).collect();
-    skin.iter().enumerate().for_each(|(place, i)| among[*i] = place);
-    let all: Vec<usize> = (0..scene.skin.len()).collect();
-    let asked: Vec<usize> = scene.asked(&all).into_iter().filter(|i| inner[*i]).collect();
-    let places: Vec<usize> = asked.iter().map(|i| among[*i]).collect();
+    let scene = scene(gpu, model, mm_per_unit, plan, &studio)?;
+    let asked = Asked::of(&scene);
     let Surface::Head(head) = &scene.surface else {
         return Err(Error::new("turning", "a surface known on paper", "a head"));
     };
@@ -111,21 +97,8 @@ pub fn figure(
         studio.light(&mut lighting, TAU * frame as f32 / FRAMES as f32);
         head.renderer.render(gpu, &head.camera, &lighting, mm_per_unit)?;
         let light = read(gpu, &head.renderer.gbuffer.irradiance);
-        let lit = |(pixel, i): (&Pixel, &usize)| {
-            let mut pixel = *pixel;
-            pixel.patch.irradiance = light[*i];
-            pixel
-        };
-        let pixels: Vec<Pixel> = scene.pixels.iter().zip(&skin).map(lit).collect();
-        let truth = visible_integral(&pixels, &places, &Profile::SKIN, &|_| ());
-        let error = |result: &[Vec3]| {
-            let [mut off, mut all] = [0.0; 2];
-            for (i, truth) in asked.iter().zip(&truth) {
-                off += f64::from((result[*i] - *truth).length_squared());
-                all += f64::from(truth.length_squared());
-            }
-            (off / all).sqrt()
-        };
+        let truth = asked.truth(&scene, &light);
+        let error = |result: &[Vec3]| asked.error(result, &truth);
         fallen.push(error(&light));
         for (i, method) in methods.iter_mut().enumerate() {
             let ms = match (&mut *method, &atlases[i]) {
@@ -150,6 +123,66 @@ pub fn figure(
     }
     turned.iter_mut().zip(times).for_each(|(turned, times)| turned.ms = metrics::median(&times));
     Ok((scene, Turned { errors: fallen, ms: f64::NAN, ..Turned::default() }, turned))
+}
+
+/// The head in a studio, smaller than that of the other charts.
+fn scene(
+    gpu: &Gpu,
+    model: &Model,
+    mm_per_unit: f32,
+    plan: &Plan,
+    studio: &Environment,
+) -> Result<Scene, Error> {
+    let size = plan.size.map(|s| s / 2);
+    let camera = Camera::framing(model, View::Front, size);
+    let mut scene = Scene::head(gpu, model, mm_per_unit, "turning", size, camera)?;
+    scene.stride = 2 * plan.stride;
+    if let Surface::Head(head) = &mut scene.surface {
+        head.renderer.set_environment(gpu, studio);
+    }
+    Ok(scene)
+}
+
+/// Pixels that the truth is asked for: skin less its rim.
+struct Asked {
+    skin: Vec<usize>,
+    pixels: Vec<usize>,
+    /// Where they are among those of skin.
+    places: Vec<usize>,
+}
+
+impl Asked {
+    fn of(scene: &Scene) -> Self {
+        let inner = metrics::erode(&scene.skin, scene.size[0], scene.size[1], 1);
+        let mut among = vec![usize::MAX; scene.skin.len()];
+        let skin: Vec<usize> = (0..scene.skin.len()).filter(|i| scene.skin[*i]).collect();
+        skin.iter().enumerate().for_each(|(place, i)| among[*i] = place);
+        let all: Vec<usize> = (0..scene.skin.len()).collect();
+        let pixels: Vec<usize> = scene.asked(&all).into_iter().filter(|i| inner[*i]).collect();
+        let places = pixels.iter().map(|i| among[*i]).collect();
+        Self { skin, pixels, places }
+    }
+
+    /// The visible integral of this light.
+    fn truth(&self, scene: &Scene, light: &[Vec3]) -> Vec<Vec3> {
+        let lit = |(pixel, i): (&Pixel, &usize)| {
+            let mut pixel = *pixel;
+            pixel.patch.irradiance = light[*i];
+            pixel
+        };
+        let pixels: Vec<Pixel> = scene.pixels.iter().zip(&self.skin).map(lit).collect();
+        visible_integral(&pixels, &self.places, &Profile::SKIN, &|_| ())
+    }
+
+    /// Relative RMSE.
+    fn error(&self, result: &[Vec3], truth: &[Vec3]) -> f64 {
+        let [mut off, mut all] = [0.0; 2];
+        for (i, truth) in self.pixels.iter().zip(truth) {
+            off += f64::from((result[*i] - *truth).length_squared());
+            all += f64::from(truth.length_squared());
+        }
+        (off / all).sqrt()
+    }
 }
 
 fn read(gpu: &Gpu, texture: &TextureView) -> Vec<Vec3> {

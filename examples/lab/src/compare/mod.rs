@@ -7,7 +7,7 @@
 
 mod report;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -23,8 +23,8 @@ use crate::method::{self, Ours, OursUnrolled, ScreenMethod};
 use crate::metrics::{self, Layer};
 use crate::profile::Description;
 use crate::renderer::{
-    AtlasRenderer, BackRenderer, Camera, Environment, Gpu, Layer as Shown, Lighting, Probe, Renderer,
-    Scene, View,
+    AtlasRenderer, BackRenderer, Camera, Environment, Gpu, Layer as Shown, Lighting, Primitive, Probe,
+    Renderer, Scene, View,
 };
 use crate::truth::Patch;
 use crate::{cli, output, srgb};
@@ -36,6 +36,8 @@ const TIMED_SECONDS: f64 = 10.0;
 
 /// Gaussians narrower than this, in texels, are lost in an atlas.
 const RESOLVED_TEXELS: f32 = 0.6;
+
+const NOT_SMOOTH: &str = "Pictures of this size are not anti-aliased: the device cannot render twice it.";
 
 /// The mode of the integral over the whole mesh.
 const EQ7: &str = "eq7";
@@ -76,7 +78,7 @@ struct Options {
     view: View,
     view_name: String,
     look_at: Option<Vec3>,
-    distance_mm: f32,
+    distance_mm: Option<f32>,
     turn_degrees: f32,
     /// Names of what is skin, and of what is not.
     skin: [Vec<String>; 2],
@@ -104,7 +106,7 @@ impl Default for Options {
             view: View::Front,
             view_name: "front".into(),
             look_at: None,
-            distance_mm: 600.0,
+            distance_mm: None,
             turn_degrees: 0.0,
             skin: Default::default(),
             material: Description::skin_of_2007(),
@@ -129,7 +131,6 @@ pub fn main() -> ExitCode {
 
 fn options(arguments: &mut Arguments) -> Result<Options, Error> {
     let mut options = Options::default();
-    let mut has_distance = false;
     let degrees = |arguments: &mut Arguments| {
         arguments.number("a number within ±3.4e38", |degrees: &f32| degrees.is_finite())
     };
@@ -146,10 +147,7 @@ fn options(arguments: &mut Arguments) -> Result<Options, Error> {
                 let needs = "X,Y,Z in scene units, such as 0,1.6,0";
                 options.look_at = Some(arguments.value_by(needs, point)?);
             }
-            "--distance" => {
-                options.distance_mm = arguments.positive()?;
-                has_distance = true;
-            }
+            "--distance" => options.distance_mm = Some(arguments.positive()?),
             "--turn" => options.turn_degrees = degrees(arguments)?,
             "--skin" => options.skin[0] = arguments.names()?,
             "--not-skin" => options.skin[1] = arguments.names()?,
@@ -178,8 +176,8 @@ fn options(arguments: &mut Arguments) -> Result<Options, Error> {
             _ => return Err(arguments.unknown()),
         }
     }
-    if has_distance && options.look_at.is_none() {
-        return Err(Error::new("--distance", options.distance_mm, "--look-at, from where it is measured"));
+    if let (Some(distance_mm), None) = (options.distance_mm, options.look_at) {
+        return Err(Error::new("--distance", distance_mm, "--look-at, from where it is measured"));
     }
     if let Some(name) = options.skin[0].iter().find(|name| options.skin[1].contains(name)) {
         return Err(Error::new("--not-skin", name, "names that --skin has not"));
@@ -231,97 +229,130 @@ fn compare(options: &Options) -> Result<(), Error> {
     };
 
     step("loading the model");
-    let (model, scene, size_mm) = load(options)?;
+    let loaded = Loaded::new(options)?;
+    let scene = &loaded.scene;
     let gpu = Gpu::headless()?;
 
     step("scattering");
-    let mut shot = Shot::new(&gpu, &scene, options, options.size, TIMED_RUNS)?;
+    let mut shot = Shot::new(&gpu, scene, options, options.size, TIMED_RUNS)?;
     if options.has_eq7 {
         step("Eq. 7 over the whole mesh");
-        shot.add_eq7(&gpu, &scene, options, &progress);
+        shot.add_eq7(&gpu, scene, options, &progress);
     }
 
     // What is measured is of pixels that have one sample each, as methods take them.
     step("scattering at twice the size, for smooth pictures");
-    let twice = options.size.map(|s| s.saturating_mul(2));
-    // Eq. 7 would take four times as long.
-    let fine = match gpu.check_size(twice) {
-        Ok(()) if !options.has_eq7 => Some(Shot::new(&gpu, &scene, options, twice, 1)?),
-        _ => None,
-    };
+    let fine = Shot::fine(&gpu, scene, options)?;
 
     step("measuring");
     let frame = Skin::read(&gpu, &shot);
-    let mm_per_texel = mm_per_texel(&scene, options);
-    let finest = mm_per_texel.iter().map(|(_, mm)| *mm).fold(f32::INFINITY, f32::min);
-    let coarsest = mm_per_texel.iter().map(|(_, mm)| *mm).fold(0.0, f32::max);
     let measured = measure(&gpu, &shot, fine.as_ref(), &frame, options.exposure);
     let mut notes = shot.notes(options, &frame);
-    if fine.is_none() && !options.has_eq7 {
-        notes.push("Pictures of this size are not anti-aliased: the device cannot render twice it.".into());
-    }
-    if finest < coarsest {
-        notes.push(format!(
-            "The primitives differ: {finest:.3} to {coarsest:.3} mm a texel; the coarsest is given."
-        ));
-    }
-    // A face of a doll, or of a statue; nobody's.
-    if !(30.0..=3000.0).contains(&size_mm) {
-        notes.push(format!(
-            "The model is {size_mm:.0} mm long: --mm-per-unit says how many millimetres its unit has."
-        ));
-    }
-    notes.extend(scene.notes());
+    let needs_fine = !options.has_eq7 && fine.is_none();
+    notes.extend(needs_fine.then(|| NOT_SMOOTH.to_owned()));
+    notes.extend(loaded.notes());
+    let command = std::iter::once("compare".to_owned()).chain(std::env::args().skip(1));
     let report = Report {
         adapter: gpu.adapter.clone(),
         size: options.size,
-        model,
+        model: loaded.name.clone(),
         attribution: options.model.is_none().then(|| "MakeHuman base mesh and targets, CC0 1.0".into()),
         view: options.view_name.clone(),
         skin_pixels: frame.skin.iter().filter(|skin| **skin).count(),
         mm_per_px: f64::from(options.mm_per_unit / shot.camera.px_per_unit(options.size)),
-        mm_per_texel: coarsest.into(),
+        mm_per_texel: loaded.mm_per_texel()[1].into(),
         texture_size: options.texture_size,
         max_error: options.max_error,
-        unresolved: unresolved(&mm_per_texel, &options.profile),
+        unresolved: loaded.unresolved(&options.profile),
         notes,
-        command: std::iter::once("compare".to_owned())
-            .chain(std::env::args().skip(1))
-            .collect::<Vec<_>>()
-            .join(" "),
+        command: command.collect::<Vec<_>>().join(" "),
         modes: measured.reports,
         unavailable: shot.unavailable,
     };
 
     step("writing the report");
-    let files = files(&report, &measured.layers)
-        .map_err(|e| Error::new("report", format!("\"{e}\""), "pictures that can be encoded"))?;
-    output::write(&options.out, &files)
-        .map_err(|e| Error::new("--out", format!("\"{e}\""), "a directory that can be written to"))?;
+    write(&options.out, &report, &measured.layers)?;
     progress.finish_and_clear();
     println!("{}", report::table(&report));
     println!("{} in {:.1} s", options.out.join("report.html").display(), started.elapsed().as_secs_f64());
     Ok(())
 }
 
-/// The model, its name, and how long it is in mm.
-fn load(options: &Options) -> Result<(String, Scene, f32), Error> {
-    let (model, mut scene) = match &options.model {
-        Some(path) => (path.display().to_string(), Scene::load(path)?),
-        None => ("built-in head".to_owned(), Scene::from_glb(crate::HEAD)?),
-    };
-    let (low, high) = scene.bounds();
-    let size_mm = (high - low).max_element() * options.mm_per_unit;
-    if !(size_mm > 0.0 && size_mm < 1e9) {
-        let needs = "one above 0 and below 1e9 mm; --mm-per-unit says how long its unit is";
-        return Err(Error::new(model, format!("a size of {size_mm} mm"), needs));
+/// The model.
+struct Loaded {
+    name: String,
+    scene: Scene,
+    size_mm: f32,
+    /// Width of a texel on each primitive that scatters, on its fullest page.
+    texels_mm: Vec<(String, f32)>,
+}
+
+impl Loaded {
+    fn new(options: &Options) -> Result<Self, Error> {
+        let (name, mut scene) = match &options.model {
+            Some(path) => (path.display().to_string(), Scene::load(path)?),
+            None => ("built-in head".to_owned(), Scene::from_glb(crate::HEAD)?),
+        };
+        let (low, high) = scene.bounds();
+        let size_mm = (high - low).max_element() * options.mm_per_unit;
+        if !(size_mm > 0.0 && size_mm < 1e9) {
+            let needs = "one above 0 and below 1e9 mm; --mm-per-unit says how long its unit is";
+            return Err(Error::new(name, format!("a size of {size_mm} mm"), needs));
+        }
+        scene.choose(&options.skin[0], true, "--skin")?;
+        scene.choose(&options.skin[1], false, "--not-skin")?;
+        if let Some(albedo) = options.material.albedo {
+            scene.color_skin(Vec3::from(albedo.map(|a| a as f32)));
+        }
+        let skin = scene.primitives.iter().filter(|p| scene.materials[p.material].profile_id == 1);
+        let texel = |p: &Primitive| {
+            let page = (0..p.pages.len()).max_by_key(|i| p.pages[*i].len());
+            let texel = page.map_or(0.0, |page| p.texel_size(page, options.texture_size));
+            (p.name.clone(), texel * options.mm_per_unit)
+        };
+        let texels_mm = skin.map(texel).filter(|(_, mm)| *mm > 0.0).collect();
+        Ok(Self { name, scene, size_mm, texels_mm })
     }
-    scene.choose(&options.skin[0], true, "--skin")?;
-    scene.choose(&options.skin[1], false, "--not-skin")?;
-    if let Some(albedo) = options.material.albedo {
-        scene.color_skin(Vec3::from(albedo.map(|a| a as f32)));
+
+    /// The finest and the coarsest texel.
+    fn mm_per_texel(&self) -> [f32; 2] {
+        let mm = || self.texels_mm.iter().map(|(_, mm)| *mm);
+        [mm().fold(f32::INFINITY, f32::min), mm().fold(0.0, f32::max)]
     }
-    Ok((model, scene, size_mm))
+
+    /// Gaussians that an atlas loses.
+    fn unresolved(&self, profile: &Profile) -> Vec<String> {
+        let mut found = Vec::new();
+        for (name, mm) in &self.texels_mm {
+            for g in profile.gaussians() {
+                let sigma_mm = g.variance_mm2.sqrt();
+                if sigma_mm < RESOLVED_TEXELS * mm {
+                    found.push(format!("σ {sigma_mm:.3} mm is {:.2} texels on {name}", sigma_mm / mm));
+                }
+            }
+        }
+        found
+    }
+
+    /// What the reader of a report should know.
+    fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        let [finest, coarsest] = self.mm_per_texel();
+        if finest < coarsest {
+            notes.push(format!(
+                "The primitives differ: {finest:.3} to {coarsest:.3} mm a texel; the coarsest is given."
+            ));
+        }
+        // A face of a doll, or of a statue; nobody's.
+        if !(30.0..=3000.0).contains(&self.size_mm) {
+            notes.push(format!(
+                "The model is {:.0} mm long: --mm-per-unit says how many millimetres its unit has.",
+                self.size_mm
+            ));
+        }
+        notes.extend(self.scene.notes());
+        notes
+    }
 }
 
 impl Shot {
@@ -333,7 +364,7 @@ impl Shot {
         most_runs: usize,
     ) -> Result<Self, Error> {
         let mut renderer = Renderer::new(gpu, scene, size)?;
-        let distance = options.distance_mm / options.mm_per_unit;
+        let distance = options.distance_mm.unwrap_or(600.0) / options.mm_per_unit;
         let camera = match options.look_at {
             Some(point) => Camera::looking_at(scene, options.view, point, distance),
             None => Camera::framing(scene, options.view, size),
@@ -372,6 +403,15 @@ impl Shot {
         let names = ["screen_space", "screen_space_back"];
         shot.screen_space(gpu, options, names, "screen space, the exact sum", &exact, most_runs)?;
         Ok(shot)
+    }
+
+    /// At twice the size, where the device can render it; Eq. 7 would take four times as long.
+    fn fine(gpu: &Gpu, scene: &Scene, options: &Options) -> Result<Option<Self>, Error> {
+        let twice = options.size.map(|s| s.saturating_mul(2));
+        match gpu.check_size(twice) {
+            Ok(()) if !options.has_eq7 => Self::new(gpu, scene, options, twice, 1).map(Some),
+            _ => Ok(None),
+        }
     }
 
     /// Adds the modes of a plan: of what is seen, and with the layer behind where there is one.
@@ -600,38 +640,17 @@ fn area(i: usize, depth: f32, normal: [f32; 4], inverse: Mat4, size: [u32; 2]) -
     f64::from(p.z.abs().powi(3) / (facing.max(0.1) * p.length()))
 }
 
-/// Width of a texel on the skin in mm, for each primitive that scatters, on its fullest page.
-fn mm_per_texel(scene: &Scene, options: &Options) -> Vec<(String, f32)> {
-    scene
-        .primitives
-        .iter()
-        .filter(|p| scene.materials[p.material].profile_id == 1)
-        .map(|p| {
-            let page = (0..p.pages.len()).max_by_key(|i| p.pages[*i].len());
-            let texel = page.map_or(0.0, |page| p.texel_size(page, options.texture_size));
-            (p.name.clone(), texel * options.mm_per_unit)
-        })
-        .filter(|(_, mm)| *mm > 0.0)
-        .collect()
-}
-
-fn unresolved(mm_per_texel: &[(String, f32)], profile: &Profile) -> Vec<String> {
-    let mut found = Vec::new();
-    for (name, mm) in mm_per_texel {
-        for g in profile.gaussians() {
-            let sigma_mm = g.variance_mm2.sqrt();
-            if sigma_mm < RESOLVED_TEXELS * mm {
-                found.push(format!("σ {sigma_mm:.3} mm is {:.2} texels on {name}", sigma_mm / mm));
-            }
-        }
-    }
-    found
-}
-
 struct Measured {
     reports: Vec<ModeReport>,
     /// Name of the mode, scattered irradiance.
     layers: Vec<(&'static str, Layer)>,
+}
+
+/// Where two layers differ by more than 0.01.
+fn changed(a: &Layer, b: &Layer, mask: &[bool]) -> Vec<bool> {
+    let apart = |(a, b): (&[f32; 3], &[f32; 3])| (Vec3::from(*a) - Vec3::from(*b)).abs().max_element();
+    let apart = a.pixels.iter().zip(&b.pixels).map(apart);
+    apart.zip(mask).map(|(apart, inside)| *inside && apart > 0.01).collect()
 }
 
 fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: f32) -> Measured {
@@ -654,13 +673,7 @@ fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: 
     let inner = metrics::erode(&frame.skin, width, height, 2);
     let reference = modes.iter().position(|m| m.name == "texture_space");
     let truth = modes.iter().position(|m| m.name == EQ7);
-    let scattered = reference.map(|r| {
-        let pairs = irradiance[r].pixels.iter().zip(&irradiance[0].pixels);
-        pairs
-            .zip(&inner)
-            .map(|((a, b), inner)| *inner && (Vec3::from(*a) - Vec3::from(*b)).abs().max_element() > 0.01)
-            .collect::<Vec<_>>()
-    });
+    let scattered = reference.map(|r| changed(&irradiance[r], &irradiance[0], &inner));
     // A measure of two layers, of a mode and of what it is held to, where that is there.
     type Of = fn(&Layer, &Layer, &[bool]) -> Option<f64>;
     let to = |layers: &[Layer], i: usize, other: Option<usize>, mask: &[bool], of: Of| {
@@ -697,6 +710,13 @@ fn measure(gpu: &Gpu, shot: &Shot, fine: Option<&Shot>, frame: &Skin, exposure: 
     }
     let names = modes.iter().map(|m| m.name);
     Measured { reports, layers: names.zip(irradiance).collect() }
+}
+
+fn write(out: &Path, report: &Report, layers: &[(&'static str, Layer)]) -> Result<(), Error> {
+    let files = files(report, layers)
+        .map_err(|e| Error::new("report", format!("\"{e}\""), "pictures that can be encoded"))?;
+    output::write(out, &files)
+        .map_err(|e| Error::new("--out", format!("\"{e}\""), "a directory that can be written to"))
 }
 
 fn files(report: &Report, layers: &[(&'static str, Layer)]) -> image::ImageResult<Vec<(String, Vec<u8>)>> {
@@ -738,7 +758,7 @@ mod tests {
             size,
             view,
             look_at,
-            distance_mm: 150.0,
+            distance_mm: Some(150.0),
             lighting,
             has_back: true,
             texture_size: 64,

@@ -25,10 +25,6 @@ const EXPOSURE: f32 = 1.3;
 /// # Errors
 /// A drawing that cannot be made.
 pub fn picture(material: &Description, profile: &Profile, strip: &Strip) -> Result<RgbImage, Error> {
-    let own = [0, 1, 2].map(|c| {
-        let gaussians = profile.gaussians().iter();
-        Response::gaussians(gaussians.map(|g| (g.variance_mm2.into(), g.weight[c].into())))
-    });
     let mut svg = Svg::default();
     svg.text([20.0, 34.0], &material.title, TITLE);
     let count = profile.gaussians().len();
@@ -39,39 +35,7 @@ pub fn picture(material: &Description, profile: &Profile, strip: &Strip) -> Resu
     );
     svg.text([20.0, 55.0], &about, Type::new(DIM, 13.0));
 
-    let radii: Vec<f64> = (0..=120).map(|i| 0.01 * 10f64.powf(f64::from(i) / 120.0 * 3.3)).collect();
-    let mass = |r: &Response| 1.0 / r.albedo();
-    // Down to where nothing is seen.
-    let radial = |r: &Response| -> Vec<(f64, f64)> {
-        let points = radii.iter().map(|mm| (*mm, mass(r) * r.radial(*mm)));
-        points.filter(|(_, value)| *value > 1e-6).collect()
-    };
-    let edge = |r: &Response| radii.iter().map(|mm| (*mm, r.edge(*mm))).collect::<Vec<_>>();
-    let x = Scale::over(radii.iter().copied());
-    let lines: Vec<_> = material.responses.iter().map(radial).collect();
-    let values = lines.iter().flatten().map(|(_, value)| *value);
-    let panels = [
-        ("what leaves a point of light", "R(r)/R, 1/mm²", "r, mm", Scale::over(values)),
-        ("the edge of light", "E(x)", "x, mm inside light", Scale::linear(0.5, 1.02)),
-    ];
-    for (i, (title, name_y, name_x, y)) in panels.into_iter().enumerate() {
-        let left = 76.0 + 470.0 * i as f64;
-        let area = Area { left, top: 96.0, right: left + 390.0, bottom: 390.0 };
-        let panel = Panel::new(area, x, y);
-        panel.grid(&mut svg, &x.ticks(), true);
-        panel.name_x(&mut svg, name_x);
-        panel.name_y(&mut svg, name_y);
-        svg.text([left, 88.0], title, LEGEND);
-        for (c, (_, color)) in COLORS.iter().enumerate() {
-            let of = |r: &Response| if i == 0 { radial(r) } else { edge(r) };
-            panel.line(&mut svg, &of(&material.responses[c]), Stroke::new(color, 1.6));
-            panel.line(
-                &mut svg,
-                &of(&own[c]),
-                Stroke::new(color, 3.2).dashed("0.1 6\" stroke-linecap=\"round"),
-            );
-        }
-    }
+    panels(&mut svg, material, profile);
     let (left, tops, height) = STRIP;
     for (top, text) in tops.into_iter().zip([
         "A strip of it, 46 mm, lit to the left and by lines of 4, 2, 1 and ½ mm",
@@ -99,4 +63,42 @@ pub fn picture(material: &Description, profile: &Profile, strip: &Strip) -> Resu
         overlay(&mut picture, &strip, 2 * left as i64, 2 * top as i64);
     }
     Ok(picture)
+}
+
+/// R(r) and E(x).
+fn panels(svg: &mut Svg, material: &Description, profile: &Profile) {
+    let own = [0, 1, 2].map(|c| {
+        let gaussians = profile.gaussians().iter();
+        Response::gaussians(gaussians.map(|g| (g.variance_mm2.into(), g.weight[c].into())))
+    });
+    let radii: Vec<f64> = (0..=120).map(|i| 0.01 * 10f64.powf(f64::from(i) / 120.0 * 3.3)).collect();
+    let mass = |r: &Response| 1.0 / r.albedo();
+    // Down to where nothing is seen.
+    let radial = |r: &Response| -> Vec<(f64, f64)> {
+        let points = radii.iter().map(|mm| (*mm, mass(r) * r.radial(*mm)));
+        points.filter(|(_, value)| *value > 1e-6).collect()
+    };
+    let edge = |r: &Response| radii.iter().map(|mm| (*mm, r.edge(*mm))).collect::<Vec<_>>();
+    let x = Scale::over(radii.iter().copied());
+    let lines: Vec<_> = material.responses.iter().map(radial).collect();
+    let values = lines.iter().flatten().map(|(_, value)| *value);
+    let panels = [
+        ("what leaves a point of light", "R(r)/R, 1/mm²", "r, mm", Scale::over(values)),
+        ("the edge of light", "E(x)", "x, mm inside light", Scale::linear(0.5, 1.02)),
+    ];
+    for (i, (title, name_y, name_x, y)) in panels.into_iter().enumerate() {
+        let left = 76.0 + 470.0 * i as f64;
+        let area = Area { left, top: 96.0, right: left + 390.0, bottom: 390.0 };
+        let panel = Panel::new(area, x, y);
+        panel.grid(svg, &x.ticks(), true);
+        panel.name_x(svg, name_x);
+        panel.name_y(svg, name_y);
+        svg.text([left, 88.0], title, LEGEND);
+        for (c, (_, color)) in COLORS.iter().enumerate() {
+            let of = |r: &Response| if i == 0 { radial(r) } else { edge(r) };
+            panel.line(svg, &of(&material.responses[c]), Stroke::new(color, 1.6));
+            let dots = Stroke::new(color, 3.2).dashed("0.1 6\" stroke-linecap=\"round");
+            panel.line(svg, &of(&own[c]), dots);
+        }
+    }
 }

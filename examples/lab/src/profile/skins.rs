@@ -44,18 +44,7 @@ pub fn compare(paths: u64) -> Result<(String, RgbImage), Error> {
     let mut say = |line: String| writeln!(table, "{line}").expect("a String takes all text");
     say(format!("{:32}{:>9}{:>9}{:>9}", "worst error of a step edge", "red", "green", "blue"));
     let mut svg = Svg::default();
-    svg.text([20.0, 34.0], "Three skins, by the profiles of others and by ours", TITLE);
-    let meaning = "Error of a step edge against a random walk through both layers, as a share of the light. \
-                   Band: ±1/255.";
-    svg.text([20.0, 55.0], meaning, Type::new(DIM, 13.0));
-    for (i, (name, color, dashes)) in RIVALS.into_iter().enumerate() {
-        let at = [26.0 + 300.0 * (i % 3) as f64, 78.0 + 20.0 * (i / 3) as f64];
-        svg.line(
-            &[[at[0], at[1] - 4.0], [at[0] + 26.0, at[1] - 4.0]],
-            Stroke::new(color, 2.0).dashed(dashes),
-        );
-        svg.text([at[0] + 34.0, at[1]], name, LEGEND);
-    }
+    legend(&mut svg);
     let skins = [("light", Skin::LIGHT), ("medium", Skin::MEDIUM), ("dark", Skin::DARK)];
     for (row, (name, skin)) in skins.into_iter().enumerate() {
         bar.set_message(format!("walking through {name} skin"));
@@ -72,41 +61,10 @@ pub fn compare(paths: u64) -> Result<(String, RgbImage), Error> {
         let fit = Fit::within(&skin.responses(&Transport::default())?, DEFAULT_MAX_ERROR.into())?;
         say(format!("{name} skin, {} Gaussians", fit.profile.gaussians().len()));
         let mut worst = [[0.0; 3]; RIVALS.len()];
-        for (c, (color, _)) in COLORS.iter().enumerate() {
-            let exact: Vec<f64> = places.iter().map(|x| truth[c].edge(*x)).collect();
-            let curves = [
-                (spread(&Profile::SKIN, c), false),
-                (spread(&Profile::SKIN, c), true),
-                (dipole(truth[c].albedo())?, true),
-                (Burley::Searchlight.response(truth[c].albedo(), 1.0)?, true),
-                (spread(&fit.profile, c), false),
-            ];
-            let left = 72.0 + 300.0 * c as f64;
-            let top = 132.0 + 224.0 * row as f64;
-            let area = Area { left, top, right: left + 268.0, bottom: top + 180.0 };
-            let (x, y) = (Scale::over(X_MM.into_iter()), Scale::linear(-ERRORS, ERRORS));
-            let panel = Panel::new(area, x, y);
-            panel.grid(&mut svg, &x.ticks(), c == 0);
-            svg.text([left, top - 7.0], &format!("{name} skin, {color}"), LEGEND);
-            if c == 0 {
-                panel.name_y(&mut svg, "error of E(x)");
-            }
-            if row == 2 {
-                panel.name_x(&mut svg, "x, mm from the edge");
-            }
-            for limit in [-1.0, 1.0] {
-                let level = limit * f64::from(DEFAULT_MAX_ERROR);
-                panel.line(&mut svg, &[(X_MM[0], level), (X_MM[1], level)], Stroke::new("#333", 0.7));
-            }
-            for (i, (response, is_scaled)) in curves.iter().enumerate() {
-                let errors = |scale: f64| -> Vec<f64> {
-                    places.iter().zip(&exact).map(|(x, e)| response.edge(x / scale) - e).collect()
-                };
-                let errors = errors(if *is_scaled { best_scale(&errors) } else { 1.0 });
-                worst[i][c] = largest(&errors);
-                let (_, color, dashes) = RIVALS[i];
-                let points: Vec<(f64, f64)> = places.iter().copied().zip(errors).collect();
-                panel.line(&mut svg, &points, Stroke::new(color, 1.6).dashed(dashes));
+        for c in 0..3 {
+            let errors = panel(&mut svg, &places, (row, name), c, &truth[c], &fit.profile)?;
+            for (worst, errors) in worst.iter_mut().zip(errors) {
+                worst[c] = errors;
             }
         }
         for ((name, ..), [r, g, b]) in RIVALS.iter().zip(worst) {
@@ -124,6 +82,69 @@ pub fn compare(paths: u64) -> Result<(String, RgbImage), Error> {
     let refused =
         |e: Box<dyn std::error::Error>| Error::new("three-skins.png", format!("\"{e}\""), "a drawing");
     Ok((table, Rasteriser::new().picture(&drawing).map_err(refused)?))
+}
+
+fn legend(svg: &mut Svg) {
+    svg.text([20.0, 34.0], "Three skins, by the profiles of others and by ours", TITLE);
+    let meaning = "Error of a step edge against a random walk through both layers, as a share of the light. \
+                   Band: ±1/255.";
+    svg.text([20.0, 55.0], meaning, Type::new(DIM, 13.0));
+    for (i, (name, color, dashes)) in RIVALS.into_iter().enumerate() {
+        let at = [26.0 + 300.0 * (i % 3) as f64, 78.0 + 20.0 * (i / 3) as f64];
+        svg.line(
+            &[[at[0], at[1] - 4.0], [at[0] + 26.0, at[1] - 4.0]],
+            Stroke::new(color, 2.0).dashed(dashes),
+        );
+        svg.text([at[0] + 34.0, at[1]], name, LEGEND);
+    }
+}
+
+/// Draws the errors of all on a colour of a skin; returns the worst of each.
+fn panel(
+    svg: &mut Svg,
+    places: &[f64],
+    (row, name): (usize, &str),
+    c: usize,
+    truth: &Response,
+    fit: &Profile,
+) -> Result<[f64; RIVALS.len()], Error> {
+    let exact: Vec<f64> = places.iter().map(|x| truth.edge(*x)).collect();
+    let curves = [
+        (spread(&Profile::SKIN, c), false),
+        (spread(&Profile::SKIN, c), true),
+        (dipole(truth.albedo())?, true),
+        (Burley::Searchlight.response(truth.albedo(), 1.0)?, true),
+        (spread(fit, c), false),
+    ];
+    let left = 72.0 + 300.0 * c as f64;
+    let top = 132.0 + 224.0 * row as f64;
+    let area = Area { left, top, right: left + 268.0, bottom: top + 180.0 };
+    let (x, y) = (Scale::over(X_MM.into_iter()), Scale::linear(-ERRORS, ERRORS));
+    let panel = Panel::new(area, x, y);
+    panel.grid(svg, &x.ticks(), c == 0);
+    svg.text([left, top - 7.0], &format!("{name} skin, {}", COLORS[c].0), LEGEND);
+    if c == 0 {
+        panel.name_y(svg, "error of E(x)");
+    }
+    if row == 2 {
+        panel.name_x(svg, "x, mm from the edge");
+    }
+    for limit in [-1.0, 1.0] {
+        let level = limit * f64::from(DEFAULT_MAX_ERROR);
+        panel.line(svg, &[(X_MM[0], level), (X_MM[1], level)], Stroke::new("#333", 0.7));
+    }
+    let mut worst = [0.0; RIVALS.len()];
+    for (i, (response, is_scaled)) in curves.iter().enumerate() {
+        let errors = |scale: f64| -> Vec<f64> {
+            places.iter().zip(&exact).map(|(x, e)| response.edge(x / scale) - e).collect()
+        };
+        let errors = errors(if *is_scaled { best_scale(&errors) } else { 1.0 });
+        worst[i] = largest(&errors);
+        let (_, color, dashes) = RIVALS[i];
+        let points: Vec<(f64, f64)> = places.iter().copied().zip(errors).collect();
+        panel.line(svg, &points, Stroke::new(color, 1.6).dashed(dashes));
+    }
+    Ok(worst)
 }
 
 /// A profile's colour.

@@ -284,15 +284,7 @@ impl Reader<'_> {
         let name = if alone { mesh_name.clone() } else { format!("{mesh_name}/{}", from.index()) };
         let input = format!("{}, mesh {}", self.input, name.strip_prefix("mesh ").unwrap_or(&name));
         let fail = |(got, needs): Problem| Error::new(&input, got, needs);
-        let has_no_bytes = |a: &gltf::Accessor| a.view().is_none() && a.sparse().is_none();
-        if from.get(&Semantic::Positions).is_some_and(|a| has_no_bytes(&a)) {
-            let draco = from.extension_value("KHR_draco_mesh_compression").is_some();
-            let got = if draco { "KHR_draco_mesh_compression" } else { "POSITION without bytes" };
-            return Err(fail((got.into(), "plain positions")));
-        }
-        if from.indices().is_some_and(|a| has_no_bytes(&a)) {
-            return Err(fail(("indices without bytes".into(), "a buffer view of them")));
-        }
+        check_bytes(from).map_err(fail)?;
         let count = from.get(&Semantic::Positions).map_or(0, |a| a.count());
         let triangles = self.triangles(from, count).map_err(fail)?;
         if triangles.is_empty() {
@@ -314,13 +306,7 @@ impl Reader<'_> {
         }
         let world = self.tree.worlds[node.index()];
         let (mut vertices, mut indices, head) = attributes.place(&triangles, world);
-        let is_finite = |v: &Vertex| {
-            bytemuck::bytes_of(v).as_chunks().0.iter().all(|x| f32::from_ne_bytes(*x).is_finite())
-        };
-        if let Some(i) = vertices.iter().position(|v| !is_finite(v)) {
-            let got = format!("NaN or infinity at vertex {i}, as its node places it");
-            return Err(fail((got, "finite attributes and transforms")));
-        }
+        check_finite(&vertices).map_err(fail)?;
         if vertices.iter().any(|v| v.normal == [0.0; 3]) {
             complete_normals(&mut vertices, &indices);
         }
@@ -376,5 +362,31 @@ impl Reader<'_> {
         };
         triangles.retain(|[a, b, c]| a != b && b != c && c != a);
         Ok(triangles)
+    }
+}
+
+/// Positions and indices may lie in an extension, or nowhere.
+fn check_bytes(from: &gltf::Primitive) -> Result<(), Problem> {
+    let has_no_bytes = |a: &gltf::Accessor| a.view().is_none() && a.sparse().is_none();
+    if from.get(&Semantic::Positions).is_some_and(|a| has_no_bytes(&a)) {
+        let draco = from.extension_value("KHR_draco_mesh_compression").is_some();
+        let got = if draco { "KHR_draco_mesh_compression" } else { "POSITION without bytes" };
+        return Err((got.into(), "plain positions"));
+    }
+    match from.indices().is_some_and(|a| has_no_bytes(&a)) {
+        true => Err(("indices without bytes".into(), "a buffer view of them")),
+        false => Ok(()),
+    }
+}
+
+fn check_finite(vertices: &[Vertex]) -> Result<(), Problem> {
+    let is_finite =
+        |v: &Vertex| bytemuck::bytes_of(v).as_chunks().0.iter().all(|x| f32::from_ne_bytes(*x).is_finite());
+    match vertices.iter().position(|v| !is_finite(v)) {
+        Some(i) => {
+            let got = format!("NaN or infinity at vertex {i}, as its node places it");
+            Err((got, "finite attributes and transforms"))
+        }
+        None => Ok(()),
     }
 }

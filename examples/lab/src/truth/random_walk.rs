@@ -110,75 +110,94 @@ fn response(rings: &[f64; RINGS]) -> Response {
     Response::rings(rings.iter().enumerate().map(ring))
 }
 
+/// Light on its way through layers.
+struct Light {
+    weight: f64,
+    /// In mm, z down.
+    at: [f64; 3],
+    way: [f64; 3],
+    layer: usize,
+    /// Of the layer, in mm.
+    top: f64,
+}
+
 /// Follows light from the surface until it is gone.
 fn path(medium: &Medium, incidence: Incidence, random: &mut Random, rings: &mut [f64; RINGS]) {
     let eta = medium.eta();
-    let layers = medium.layers();
-    let mut weight = 1.0;
-    let mut at = [0.0f64; 3]; // z down
-    let mut way = [0.0, 0.0, 1.0];
+    let mut light = Light { weight: 1.0, at: [0.0; 3], way: [0.0, 0.0, 1.0], layer: 0, top: 0.0 };
     if incidence == Incidence::Cosine {
         let u = random.next();
         let inside = (1.0 - (1.0 - u) / (eta * eta)).sqrt();
-        weight = 1.0 - fresnel_inside(inside, eta);
-        way = [(1.0 - inside * inside).sqrt(), 0.0, inside];
+        light.weight = 1.0 - fresnel_inside(inside, eta);
+        light.way = [(1.0 - inside * inside).sqrt(), 0.0, inside];
     }
-    let (mut layer, mut top) = (0, 0.0);
     loop {
         // An optical depth to the next event.
-        let mut left = -(1.0 - random.next()).ln();
+        light.fly(medium, -(1.0 - random.next()).ln(), rings);
+        if light.weight == 0.0 {
+            return;
+        }
+        let here = &medium.layers()[light.layer];
+        light.weight *= here.sigma_s_per_mm / (here.sigma_a_per_mm + here.sigma_s_per_mm);
+        // What is too weak to matter goes on in one of ten, with ten times the weight.
+        if light.weight < 0.02 {
+            if random.next() >= 0.1 {
+                return;
+            }
+            light.weight *= 10.0;
+            if light.weight == 0.0 {
+                return;
+            }
+        }
+        light.way = scatter(light.way, here.g, random);
+    }
+}
+
+impl Light {
+    /// Goes on for so much optical depth, through faces and back from the surface; what leaves falls into
+    /// rings.
+    fn fly(&mut self, medium: &Medium, mut left: f64, rings: &mut [f64; RINGS]) {
+        let layers = medium.layers();
         loop {
-            let here = &layers[layer];
+            let here = &layers[self.layer];
             let sigma_t = here.sigma_a_per_mm + here.sigma_s_per_mm;
-            let (mut to_face, mut next) = (f64::INFINITY, layer);
-            if way[2] > 0.0 && here.thickness_mm < f64::INFINITY {
-                to_face = (top + here.thickness_mm - at[2]) / way[2];
-                next = layer + 1;
-            } else if way[2] < 0.0 {
-                to_face = (top - at[2]) / way[2];
-                next = layer.wrapping_sub(1);
+            let (mut to_face, mut next) = (f64::INFINITY, self.layer);
+            if self.way[2] > 0.0 && here.thickness_mm < f64::INFINITY {
+                to_face = (self.top + here.thickness_mm - self.at[2]) / self.way[2];
+                next = self.layer + 1;
+            } else if self.way[2] < 0.0 {
+                to_face = (self.top - self.at[2]) / self.way[2];
+                next = self.layer.wrapping_sub(1);
             }
             let to_face = to_face.max(0.0);
             let ends = left <= sigma_t * to_face;
             let step = if ends { left / sigma_t } else { to_face };
-            for (at, way) in at.iter_mut().zip(way) {
+            for (at, way) in self.at.iter_mut().zip(self.way) {
                 *at += step * way;
             }
             if ends {
-                break;
+                return;
             }
             left -= sigma_t * to_face;
             if next == usize::MAX {
-                let reflected = fresnel_inside(-way[2], eta);
-                let r = at[0].hypot(at[1]);
+                let reflected = fresnel_inside(-self.way[2], medium.eta());
+                let r = self.at[0].hypot(self.at[1]);
                 let ring = (1.0 + position(r).floor()).clamp(0.0, (RINGS - 1) as f64);
-                rings[ring as usize] += weight * (1.0 - reflected);
-                weight *= reflected;
-                at[2] = 0.0;
-                way[2] = -way[2];
-                if weight == 0.0 {
+                rings[ring as usize] += self.weight * (1.0 - reflected);
+                self.weight *= reflected;
+                self.at[2] = 0.0;
+                self.way[2] = -self.way[2];
+                if self.weight == 0.0 {
                     return;
                 }
             } else {
                 // On the face itself, or rounding would leave it on the wrong side.
-                at[2] = if next > layer { top + here.thickness_mm } else { top };
-                top = if next > layer { at[2] } else { top - layers[next].thickness_mm };
-                layer = next;
+                let is_below = next > self.layer;
+                self.at[2] = if is_below { self.top + here.thickness_mm } else { self.top };
+                self.top = if is_below { self.at[2] } else { self.top - layers[next].thickness_mm };
+                self.layer = next;
             }
         }
-        let here = &layers[layer];
-        weight *= here.sigma_s_per_mm / (here.sigma_a_per_mm + here.sigma_s_per_mm);
-        // What is too weak to matter goes on in one of ten, with ten times the weight.
-        if weight < 0.02 {
-            if random.next() >= 0.1 {
-                return;
-            }
-            weight *= 10.0;
-            if weight == 0.0 {
-                return;
-            }
-        }
-        way = scatter(way, here.g, random);
     }
 }
 

@@ -92,8 +92,7 @@ pub fn surface_integral<E>(
         }
         result.samples += pieces.len();
         let lit = Cloud::new(&lit);
-        let surface: Vec<Patch> = pieces.iter().flat_map(Piece::thirds).collect();
-        let surface = Cloud::new(&surface);
+        let surface = Cloud::new(&pieces.iter().flat_map(Piece::thirds).collect::<Vec<_>>());
         drop(pieces);
         let sums = |p: &Patch| {
             let mut sums = [Vec3::ZERO; 2];

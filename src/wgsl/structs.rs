@@ -1,8 +1,12 @@
-//! Checks that structs which Rust and WGSL both spell out lie alike in memory.
+//! Checks that structs which Rust and WGSL both spell out lie alike in memory; for the lab's shaders, too.
+
+pub(crate) fn parse(source: &str) -> naga::Module {
+    naga::front::wgsl::parse_str(source).expect("the shader parses")
+}
 
 /// Byte offsets of the members of a WGSL struct, by name, and its size.
 pub(crate) fn layout(source: &str, name: &str) -> (Vec<(String, usize)>, usize) {
-    let module = naga::front::wgsl::parse_str(source).expect("the shader parses");
+    let module = parse(source);
     let (members, span) = module
         .types
         .iter()
