@@ -28,13 +28,9 @@ fn slab(thickness_mm: f64, light: [f64; 2]) -> [GBuffer; 2] {
     [face(300.0, light[0]), face(300.0 + thickness_mm, light[1])]
 }
 
-fn color(pixel: [f32; 4]) -> DVec3 {
-    DVec3::new(pixel[0].into(), pixel[1].into(), pixel[2].into())
-}
-
 /// The largest difference of any channel over these pixels.
 fn worst(out: &[[f32; 4]], pixels: &[usize], truth: impl Fn(usize) -> DVec3) -> f64 {
-    let differences = pixels.iter().map(|i| (color(out[*i]) - truth(*i)).abs().max_element());
+    let differences = pixels.iter().map(|i| (rgb(out[*i]) - truth(*i)).abs().max_element());
     largest(differences)
 }
 
@@ -169,7 +165,7 @@ fn a_viewport_holds_both_layers() {
     });
     // An even slab does not tell where it ends, since each Gaussian is divided by its mass.
     let pixel = 48 * 96 + 72;
-    let error = (color(out[pixel]) - color(whole[pixel])).abs().max_element();
+    let error = (rgb(out[pixel]) - rgb(whole[pixel])).abs().max_element();
     assert!(error <= 1e-4, "{error}");
     assert_eq!(out[0], [0.0; 4], "outside nothing is written");
 }

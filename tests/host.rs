@@ -28,8 +28,7 @@ fn record(planned: bool, to: Output, frame: &Frame, output: &TextureView, encode
     let gpu = gpu();
     let effect = ScreenSpace::new(&gpu.device, to, plan(planned)).unwrap();
     let mut view = subsurface::View::new();
-    let prepared = view.prepare(&gpu.device, &gpu.queue, &effect, frame);
-    prepared.unwrap();
+    view.prepare(&gpu.device, &gpu.queue, &effect, frame).unwrap();
     view.render(encoder, output).unwrap();
 }
 
@@ -40,6 +39,23 @@ struct Scene {
     depth: Vec<f32>,
     id: Vec<u8>,
     projection: Mat4,
+}
+
+/// Its textures.
+struct Uploaded {
+    irradiance: TextureView,
+    depth: TextureView,
+    id: TextureView,
+    projection: Mat4,
+}
+
+impl Uploaded {
+    fn frame(&self) -> Frame<'_> {
+        let mut frame = Frame::new(&self.irradiance, &self.depth, self.projection.to_cols_array_2d());
+        frame.profile_id = Some(&self.id);
+        frame.mm_per_unit = 1.0;
+        frame
+    }
 }
 
 /// What a host asks for beyond a frame of its own.
@@ -77,6 +93,15 @@ impl Scene {
                 .collect(),
             id: hits.iter().map(|h| u8::from(h.is_some())).collect(),
             projection: view.projection.as_mat4(),
+        }
+    }
+
+    fn upload(&self, gpu: &Gpu) -> Uploaded {
+        Uploaded {
+            irradiance: gpu.upload("irradiance", self.size, HALF, &halves(&self.irradiance)),
+            depth: gpu.upload("depth", self.size, TextureFormat::R32Float, &self.depth),
+            id: gpu.upload("id", self.size, TextureFormat::R8Uint, &self.id),
+            projection: self.projection,
         }
     }
 
@@ -118,16 +143,16 @@ impl Scene {
             let [from, to] = [&held, &to].map(|view| view.texture().as_image_copy());
             encoder.copy_texture_to_texture(from, to, held.texture().size());
         });
-        let ids = (!asked.no_ids).then(|| gpu.upload("id", self.size, TextureFormat::R8Uint, &self.id));
+        let mut textures = self.upload(gpu);
         let full = TextureFormat::Rgba32Float;
-        let irradiance = gpu.upload("irradiance", self.size, full, &self.irradiance);
-        let depth = gpu.upload("depth", self.size, TextureFormat::R32Float, &self.depth);
-        let mut frame = Frame::new(&irradiance, &depth, self.projection.to_cols_array_2d());
-        frame.profile_id = ids.as_ref();
+        textures.irradiance = gpu.upload("irradiance", self.size, full, &self.irradiance);
+        let mut frame = textures.frame();
+        if asked.no_ids {
+            frame.profile_id = None;
+        }
         frame.strength = asked.strength;
         frame.albedo = asked.albedo;
         frame.viewport = asked.viewport;
-        frame.mm_per_unit = 1.0;
         gpu.run(|encoder| record(planned, output, &frame, &to, encoder));
         gpu.read(&to)
     }
@@ -187,13 +212,9 @@ fn one_effect_serves_frames_that_change() {
     let gpu = gpu();
     let more = Scene::new().within_more();
     let output = gpu.target("output", more.size, HALF);
-    let irradiance = gpu.upload("irradiance", more.size, HALF, &halves(&more.irradiance));
-    let depth = gpu.upload("depth", more.size, TextureFormat::R32Float, &more.depth);
-    let id = gpu.upload("id", more.size, TextureFormat::R8Uint, &more.id);
-    let mut first = Frame::new(&irradiance, &depth, more.projection.to_cols_array_2d());
-    first.profile_id = Some(&id);
+    let textures = more.upload(gpu);
+    let mut first = textures.frame();
     first.viewport = Some(PLACE);
-    first.mm_per_unit = 1.0;
     let changed = |change: &dyn Fn(&mut Frame)| {
         let mut frame = first;
         change(&mut frame);
@@ -224,8 +245,7 @@ fn one_effect_serves_frames_that_change() {
         for (effect, by_plan) in effects.iter().zip([false, true]) {
             let anew = seen(&mut |encoder| record(by_plan, HALF.into(), frame, &output, encoder));
             let kept = seen(&mut |encoder| {
-                let prepared = view.prepare(&gpu.device, &gpu.queue, effect, frame);
-                prepared.unwrap();
+                view.prepare(&gpu.device, &gpu.queue, effect, frame).unwrap();
                 view.render(encoder, &output).unwrap();
             });
             assert_eq!(kept, anew, "frame {i}, planned: {by_plan}");
@@ -239,23 +259,7 @@ fn no_pipeline_is_made_from_frame_to_frame() {
     // A device of its own, since it counts for all tests at once.
     let gpu = &Gpu::headless().unwrap();
     let scenes = [Scene::new(), Scene::new().within_more()];
-    let upload = |scene: &Scene| {
-        let size = scene.size;
-        [
-            gpu.upload("irradiance", size, HALF, &halves(&scene.irradiance)),
-            gpu.upload("depth", size, TextureFormat::R32Float, &scene.depth),
-            gpu.upload("id", size, TextureFormat::R8Uint, &scene.id),
-        ]
-    };
-    let textures = scenes.each_ref().map(upload);
-    let frame = |i: usize| {
-        let [irradiance, depth, id] = &textures[i];
-        let projection = scenes[i].projection.to_cols_array_2d();
-        let mut frame = Frame::new(irradiance, depth, projection);
-        frame.profile_id = Some(id);
-        frame.mm_per_unit = 1.0;
-        frame
-    };
+    let textures = scenes.each_ref().map(|scene| scene.upload(gpu));
     let plans = [0.004, 0.01].map(|e| Plan::new(&[Profile::SKIN], e).unwrap());
     let effects = plans.map(|plan| ScreenSpace::new(&gpu.device, HALF, &plan).unwrap());
     let mut views = [(); 2].map(|()| subsurface::View::new());
@@ -270,8 +274,7 @@ fn no_pipeline_is_made_from_frame_to_frame() {
     for i in 0..1000 {
         // Each view alternates between the plans, and both between the sizes.
         let (effect, view) = (&effects[i % 2], &mut views[i / 2 % 2]);
-        let frame = frame(i / 4 % 2);
-        view.prepare(&gpu.device, &gpu.queue, effect, &frame).unwrap();
+        view.prepare(&gpu.device, &gpu.queue, effect, &textures[i / 4 % 2].frame()).unwrap();
         // What was dropped goes when the queue is next submitted and done.
         if i % 100 < 8 {
             gpu.run(|encoder| view.render(encoder, &outputs[i / 4 % 2])).unwrap();
@@ -285,20 +288,16 @@ fn no_pipeline_is_made_from_frame_to_frame() {
 fn views_share_a_submission() {
     let gpu = gpu();
     let scene = Scene::new();
-    let size = scene.size;
-    let irradiance = gpu.upload("irradiance", size, HALF, &halves(&scene.irradiance));
-    let depth = gpu.upload("depth", size, TextureFormat::R32Float, &scene.depth);
-    let id = gpu.upload("id", size, TextureFormat::R8Uint, &scene.id);
+    let textures = scene.upload(gpu);
     let frame = |mm_per_unit| {
-        let mut frame = Frame::new(&irradiance, &depth, scene.projection.to_cols_array_2d());
-        frame.profile_id = Some(&id);
+        let mut frame = textures.frame();
         frame.mm_per_unit = mm_per_unit;
         frame
     };
     for planned in [false, true] {
         let effect = ScreenSpace::new(&gpu.device, HALF, plan(planned)).unwrap();
         let mut views = [(); 2].map(|()| subsurface::View::new());
-        let outputs = [(); 2].map(|()| gpu.target("output", size, HALF));
+        let outputs = [(); 2].map(|()| gpu.target("output", scene.size, HALF));
         gpu.run(|encoder| {
             for ((view, output), mm_per_unit) in views.iter_mut().zip(&outputs).zip([1.0, 3.0]) {
                 let frame = frame(mm_per_unit);
@@ -307,7 +306,7 @@ fn views_share_a_submission() {
             }
         });
         for (output, mm_per_unit) in outputs.iter().zip([1.0, 3.0]) {
-            let alone = gpu.target("alone", size, HALF);
+            let alone = gpu.target("alone", scene.size, HALF);
             let frame = frame(mm_per_unit);
             gpu.run(|encoder| record(planned, HALF.into(), &frame, &alone, encoder));
             assert_eq!(gpu.read(output), gpu.read(&alone), "planned: {planned}");
@@ -320,21 +319,19 @@ fn views_share_a_submission() {
 fn a_host_that_knows_its_nearest_skin_pays_for_fewer_levels() {
     let gpu = gpu();
     let scene = Scene::new();
-    let size = scene.size;
-    let irradiance = gpu.upload("irradiance", size, HALF, &halves(&scene.irradiance));
-    let depth = gpu.upload("depth", size, TextureFormat::R32Float, &scene.depth);
+    let textures = scene.upload(gpu);
     let to_view = scene.projection.inverse();
     let distance = |d: &f32| -to_view.project_point3(glam::Vec3::new(0.0, 0.0, *d)).z;
     let seen = scene.depth.iter().filter(|d| **d != 0.0);
     let nearest = seen.map(distance).fold(f32::MAX, f32::min);
     let effect = ScreenSpace::new(&gpu.device, HALF, plan(true)).unwrap();
     let levels_and_picture = |nearest| {
-        let mut frame = Frame::new(&irradiance, &depth, scene.projection.to_cols_array_2d());
-        frame.mm_per_unit = 1.0;
+        let mut frame = textures.frame();
+        frame.profile_id = None;
         frame.nearest = nearest;
         let mut view = subsurface::View::new();
         view.prepare(&gpu.device, &gpu.queue, &effect, &frame).unwrap();
-        let output = gpu.target("output", size, HALF);
+        let output = gpu.target("output", scene.size, HALF);
         gpu.run(|encoder| view.render(encoder, &output).unwrap());
         (view.tiles().unwrap().levels.len(), gpu.read(&output))
     };
@@ -357,12 +354,10 @@ fn passes_tell_their_times() {
         return;
     }
     let scene = Scene::new();
-    let size = scene.size;
-    let irradiance = gpu.upload("irradiance", size, HALF, &halves(&scene.irradiance));
-    let depth = gpu.upload("depth", size, TextureFormat::R32Float, &scene.depth);
-    let mut frame = Frame::new(&irradiance, &depth, scene.projection.to_cols_array_2d());
-    frame.mm_per_unit = 1.0;
-    let output = gpu.target("output", size, HALF);
+    let textures = scene.upload(gpu);
+    let mut frame = textures.frame();
+    frame.profile_id = None;
+    let output = gpu.target("output", scene.size, HALF);
     let count = 2 * subsurface::View::MAX_PASSES;
     let queries = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
         label: None,
@@ -401,7 +396,7 @@ fn passes_tell_their_times() {
             assert!(pair[0] <= pair[1] && pair[0] > 0, "{label}: {pair:?}");
         }
         // The same as without times.
-        let without = gpu.target("output", size, HALF);
+        let without = gpu.target("output", scene.size, HALF);
         gpu.run(|encoder| record(planned, HALF.into(), &frame, &without, encoder));
         assert_eq!(gpu.read(&output), gpu.read(&without));
     }
@@ -445,7 +440,7 @@ fn the_far_plane_is_told_from_the_near_one() {
             depth: (0..scene.depth.len())
                 .map(|i| if i % SIZE[0] as usize >= 60 { far } else { 0.5 })
                 .collect(),
-            id: Vec::new(),
+            id: scene.id.clone(),
             projection,
         };
         for planned in [false, true] {

@@ -15,16 +15,12 @@ fn plans() -> &'static [Plan; 2] {
     })
 }
 
-fn rgb(pixel: [f32; 4]) -> DVec3 {
-    DVec3::new(pixel[0].into(), pixel[1].into(), pixel[2].into())
-}
-
 /// The largest error on an edge at an angle that is soft by a pixel, away from the picture's border.
 fn edge_error(plan: &Plan, px_per_mm: f64, angle: f64) -> f64 {
     // What the border cuts from a kernel is not the closed form's.
     const REACH_MM: f64 = 9.6;
     let view = View::orthographic([400, 400], px_per_mm);
-    let across = DVec3::new(angle.to_radians().cos(), angle.to_radians().sin(), 0.0);
+    let across = direction(angle);
     let blur_mm2 = px_per_mm.powi(-2);
     let g = view.shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(step(p.dot(across), blur_mm2))));
     let out = g.scatter_planned(plan);
@@ -55,8 +51,8 @@ fn soft_edges_keep_the_error_that_was_asked_for() {
 fn hard_edges_keep_it_too() {
     let plan = &plans()[1];
     for px_per_mm in [1.5, 4.0, 8.0] {
-        for angle in [0.0, 27.0, 45.0, 90.0f64] {
-            let across = DVec3::new(angle.to_radians().cos(), angle.to_radians().sin(), 0.0);
+        for angle in [0.0, 27.0, 45.0, 90.0] {
+            let across = direction(angle);
             let g = View::orthographic([300, 300], px_per_mm)
                 .shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(step(p.dot(across), 0.0))));
             let out = g.scatter_planned(plan);

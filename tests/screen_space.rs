@@ -17,10 +17,6 @@ fn inside(view: &View, px_per_mm: f64) -> impl Fn(&Hit) -> bool {
     move |h| h.point.x.abs() < half.x - REACH_MM && h.point.y.abs() < half.y - REACH_MM
 }
 
-fn direction(degrees: f64) -> DVec3 {
-    DVec3::new(degrees.to_radians().cos(), degrees.to_radians().sin(), 0.0)
-}
-
 #[test]
 fn constant_irradiance_stays_constant() {
     // A sphere over a sloping plane, with holes, in a wide perspective.
@@ -37,7 +33,7 @@ fn constant_irradiance_stays_constant() {
     for format in [TextureFormat::Rgba32Float, TextureFormat::Rgba16Float] {
         let out = g.scatter_all(&[Profile::SKIN], format);
         for (i, _) in g.pixels(|_| true) {
-            let error = DVec3::from_slice(&out[i][..3].iter().map(|&c| c.into()).collect::<Vec<_>>()) - e;
+            let error = rgb(out[i]) - e;
             assert!(error.abs().max_element() <= 0.001, "{format:?} pixel {i}: {error}");
         }
     }

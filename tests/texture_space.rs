@@ -1,7 +1,7 @@
 //! The texture-space path against closed forms.
 
 use glam::{DVec2, DVec3};
-use subsurface::wgpu::{TextureFormat, TextureView};
+use subsurface::wgpu::TextureFormat;
 use subsurface::{Atlas, AtlasView, Profile, TextureSpace};
 use subsurface_lab::method::{self, OursUnrolled};
 use subsurface_lab::synthetic::*;
@@ -9,39 +9,10 @@ use subsurface_lab::truth::closed_form::{scattered_cosine, scattered_step, step}
 
 const FORMAT: TextureFormat = TextureFormat::Rgba32Float;
 
-/// Position in mm and irradiance of a texel; `None` off the islands.
-type Texel = Option<(DVec3, DVec3)>;
-
-/// Irradiance and positions, in metres, of an atlas of this many texels a side; `texel` takes the texel's centre.
-fn textures(size: u32, texel: impl Fn(DVec2) -> Texel) -> [TextureView; 2] {
-    let (mut irradiance, mut positions) = (Vec::new(), Vec::new());
-    for y in 0..size {
-        for x in 0..size {
-            let found = texel(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
-            let (p, e) = found.unwrap_or_default();
-            irradiance.push(e.as_vec3().extend(1.0).to_array());
-            // In metres, as most scenes are.
-            let id = f32::from(u8::from(found.is_some()));
-            positions.push((p * 1e-3).as_vec3().extend(id).to_array());
-        }
-    }
-    [("irradiance", irradiance), ("positions", positions)]
-        .map(|(name, texels)| gpu().upload(name, [size; 2], FORMAT, &texels))
-}
-
-/// The path over such an atlas.
+/// The path over an atlas.
 fn scatter(size: u32, profile: &Profile, texel: impl Fn(DVec2) -> Texel) -> Vec<DVec3> {
-    let gpu = gpu();
-    let [irradiance, positions] = &textures(size, texel);
-    let output = gpu.target("output", [size; 2], FORMAT);
-    let mut path = OursUnrolled::new(&gpu.device, FORMAT, &[*profile]).unwrap();
-    let atlas = Atlas::new(irradiance, positions);
-    method::scatter_atlas(gpu, &mut path, &atlas, &output).unwrap();
-    gpu.read(&output).iter().map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into())).collect()
-}
-
-fn center(i: usize, size: u32) -> DVec2 {
-    DVec2::new(f64::from(i as u32 % size) + 0.5, f64::from(i as u32 / size) + 0.5)
+    let mut path = OursUnrolled::new(&gpu().device, FORMAT, &[*profile]).unwrap();
+    scatter_atlas(&mut path, FORMAT, size, texel).into_iter().map(rgb).collect()
 }
 
 /// Texels of triangles that are a line, a point, or two at one place have no area, and next to none.
@@ -84,9 +55,8 @@ fn a_stretched_patch_matches_the_closed_form() {
                 Some((p.extend(7.0), DVec3::splat(step(p.dot(across), blur_mm2))))
             });
             let mut errors = Vec::new();
-            for (i, e) in out.iter().enumerate() {
+            for (e, t) in out.iter().zip(texels(size)) {
                 // Away from where the atlas's edge cuts the kernel.
-                let t = center(i, size);
                 let margin = DVec2::new(9.6 / u.length(), 9.6 / v.length()) * 1.25;
                 let inside = (t - 160.0).abs().cmplt(DVec2::splat(160.0) - margin).all();
                 if inside {
@@ -119,9 +89,9 @@ fn a_sphere_matches_eq_7() {
     let out = scatter(size, &Profile::SKIN, |t| {
         normal(t).map(|n| (n * rho_mm, DVec3::splat(n.dot(light).max(0.0))))
     });
-    let errors = out.iter().enumerate().filter_map(|(i, e)| {
+    let errors = out.iter().zip(texels(size)).filter_map(|(e, t)| {
         // The island ends at 109°; its edge cuts kernels up to 9.6 mm, or 55°, away.
-        let n = normal(center(i, size)).filter(|n| n.z > 55f64.to_radians().cos())?;
+        let n = normal(t).filter(|n| n.z > 55f64.to_radians().cos())?;
         Some(e.x - truth(n.dot(light)).x)
     });
     let red = rms(errors);
@@ -136,7 +106,7 @@ fn a_sphere_matches_eq_7() {
 fn two_atlases_share_a_submission() {
     let gpu = gpu();
     let lit = |t: DVec2| DVec3::splat(f64::from(u8::from(t.x > 16.0)));
-    let [irradiance, positions] = &textures(32, |t| Some((t.extend(0.0), lit(t))));
+    let [irradiance, positions] = &atlas(32, |t| Some((t.extend(0.0), lit(t))));
     let effect = TextureSpace::new(&gpu.device, FORMAT, &[Profile::SKIN]).unwrap();
     let scales = [1000.0, 200.0];
     let outputs = scales.map(|_| gpu.target("output", [32; 2], FORMAT));
@@ -169,12 +139,12 @@ fn islands_are_dilated() {
     let inside = |t: DVec2| (t - 32.0).abs().max_element() < 16.0;
     let e = DVec3::new(0.3, 0.6, 0.9);
     let out = scatter(size, &Profile::SKIN, |t| inside(t).then(|| ((t * 0.2).extend(0.0), e)));
-    for (i, found) in out.iter().enumerate() {
-        let outside = (center(i, size) - 32.0).abs().max_element() - 16.0;
+    for (found, t) in out.iter().zip(texels(size)) {
+        let outside = (t - 32.0).abs().max_element() - 16.0;
         if outside < 4.0 {
-            assert!((*found - e).abs().max_element() < 1e-5, "texel {i}: {found}");
+            assert!((*found - e).abs().max_element() < 1e-5, "{t}: {found}");
         } else {
-            assert_eq!(*found, DVec3::ZERO, "texel {i}");
+            assert_eq!(*found, DVec3::ZERO, "{t}");
         }
     }
 }

@@ -149,8 +149,7 @@ fn the_surface_integral_knows_edges_at_any_angle_and_tilt() {
     let xs = across_edge();
     for (angle, tilt) in [(0.0, 0.0), (27.0, 0.0), (45.0, 0.0), (90.0, 0.0), (20.0, 70.0)] {
         let turn = DMat3::from_rotation_x(f64::to_radians(tilt));
-        let (sin, cos) = f64::to_radians(angle).sin_cos();
-        let across = turn * DVec3::new(cos, sin, 0.0);
+        let across = turn * direction(angle);
         let mesh = Mesh::square(60.0, DVec3::ZERO, turn);
         let asked: Vec<_> = xs.iter().map(|x| *x * across).collect();
         for blur_mm2 in [0.01, 0.04] {
@@ -286,8 +285,7 @@ fn the_visible_integral_knows_soft_edges() {
     for px_per_mm in [0.5, 1.0, 2.0, 5.0, 8.0, 12.0] {
         for angle in [0.0, 20.0, 45.0] {
             let blur_mm2 = f64::powi(px_per_mm, -2);
-            let (sin, cos) = f64::to_radians(angle).sin_cos();
-            let across = DVec3::new(cos, sin, 0.0);
+            let across = direction(angle);
             let side = (28.0 * px_per_mm) as u32 + 16;
             let g = View::orthographic([side, side], px_per_mm)
                 .shoot(plane(DVec3::Z, 300.0, |p| DVec3::splat(step(p.dot(across), blur_mm2))));

@@ -5,9 +5,9 @@ use std::sync::OnceLock;
 
 use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{BackLayer, Frame, Plan, Profile};
+use subsurface::{Atlas, BackLayer, Frame, Plan, Profile};
 
-use crate::method::{self, Ours};
+use crate::method::{self, AtlasMethod, Ours, ScreenMethod};
 
 use crate::renderer::Gpu;
 use crate::truth::{self, Patch, Pixel};
@@ -138,10 +138,8 @@ pub struct GBuffer {
 impl GBuffer {
     /// The effect on the device, with full floats in and out.
     pub fn scatter(&self, profile: &Profile) -> Vec<DVec3> {
-        self.scatter_all(std::slice::from_ref(profile), TextureFormat::Rgba32Float)
-            .iter()
-            .map(|p| DVec3::new(p[0].into(), p[1].into(), p[2].into()))
-            .collect()
+        let out = self.scatter_all(std::slice::from_ref(profile), TextureFormat::Rgba32Float);
+        out.into_iter().map(rgb).collect()
     }
 
     pub fn scatter_all(&self, profiles: &[Profile], format: TextureFormat) -> Vec<[f32; 4]> {
@@ -166,8 +164,23 @@ impl GBuffer {
         ours: &mut Ours,
         change: impl FnOnce(&mut Frame),
     ) -> Vec<[f32; 4]> {
+        let format = ours.effect.output().format();
+        self.scatter_as(back, ours, format, change)
+    }
+
+    /// What any method makes of the frame.
+    pub fn scatter_to(&self, method: &mut dyn ScreenMethod, format: TextureFormat) -> Vec<[f32; 4]> {
+        self.scatter_as(None, method, format, |_| ())
+    }
+
+    fn scatter_as(
+        &self,
+        back: Option<&Self>,
+        method: &mut dyn ScreenMethod,
+        format: TextureFormat,
+        change: impl FnOnce(&mut Frame),
+    ) -> Vec<[f32; 4]> {
         let gpu = gpu();
-        let size = self.view.size;
         let [irradiance, depth, id] = self.upload();
         let back = back.map(Self::upload);
         let projection = self.view.projection.as_mat4().to_cols_array_2d();
@@ -180,8 +193,8 @@ impl GBuffer {
             layer
         });
         change(&mut frame);
-        let output = gpu.target("output", size, ours.effect.output().format());
-        method::scatter(gpu, ours, &frame, &output).expect("a frame that fits");
+        let output = gpu.target("output", self.view.size, format);
+        method::scatter(gpu, method, &frame, &output).expect("a frame that fits");
         gpu.read(&output)
     }
 
@@ -310,6 +323,53 @@ fn side_of_sphere(
             Hit { point: center + normal * rho_mm, normal, irradiance: irradiance(normal), id: 1 }
         })
     }
+}
+
+/// Position in mm and irradiance of a texel; `None` off the islands.
+pub type Texel = Option<(DVec3, DVec3)>;
+
+/// The centre of each texel of an atlas.
+pub fn texels(size: u32) -> impl Iterator<Item = DVec2> {
+    let row = move |y| (0..size).map(move |x| DVec2::new(x.into(), f64::from(y)) + 0.5);
+    (0..size).flat_map(row)
+}
+
+/// Irradiance and positions of an atlas of so many texels a side, by their centres.
+pub fn atlas(size: u32, texel: impl Fn(DVec2) -> Texel) -> [TextureView; 2] {
+    let (mut irradiance, mut positions) = (Vec::new(), Vec::new());
+    for found in texels(size).map(texel) {
+        let (p, e) = found.unwrap_or_default();
+        irradiance.push(e.as_vec3().extend(0.5).to_array());
+        // In metres, as most scenes are.
+        let id = f32::from(u8::from(found.is_some()));
+        positions.push((p * 1e-3).as_vec3().extend(id).to_array());
+    }
+    [("irradiance", irradiance), ("positions", positions)]
+        .map(|(name, texels)| gpu().upload(name, [size; 2], TextureFormat::Rgba32Float, &texels))
+}
+
+/// What a method makes of such an atlas.
+pub fn scatter_atlas(
+    method: &mut dyn AtlasMethod,
+    format: TextureFormat,
+    size: u32,
+    texel: impl Fn(DVec2) -> Texel,
+) -> Vec<[f32; 4]> {
+    let gpu = gpu();
+    let [irradiance, positions] = &atlas(size, texel);
+    let output = gpu.target("output", [size; 2], format);
+    let atlas = Atlas::new(irradiance, positions);
+    method::scatter_atlas(gpu, method, &atlas, &output).expect("an atlas that fits");
+    gpu.read(&output)
+}
+
+pub fn rgb([r, g, b, _]: [f32; 4]) -> DVec3 {
+    DVec3::new(r.into(), g.into(), b.into())
+}
+
+/// A direction in the picture.
+pub fn direction(degrees: f64) -> DVec3 {
+    DVec2::from_angle(degrees.to_radians()).extend(0.0)
 }
 
 /// Root mean square.

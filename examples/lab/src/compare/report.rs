@@ -93,8 +93,7 @@ struct Figure {
     name: &'static str,
     unit: &'static str,
     meaning: &'static str,
-    /// Shown times this, with so many decimals.
-    scale: f64,
+    /// With so many it is shown.
     decimals: usize,
     /// A part of the figure above it.
     part: bool,
@@ -103,105 +102,98 @@ struct Figure {
     value: fn(&ModeReport) -> Option<f64>,
 }
 
+const FIGURE: Figure = Figure {
+    key: "",
+    name: "",
+    unit: "",
+    meaning: "",
+    decimals: 2,
+    part: false,
+    optional: false,
+    value: |_| None,
+};
+
 const FIGURES: [Figure; 10] = [
     Figure {
         key: "ms",
         name: "Time",
         unit: "ms",
         meaning: "Median wall time of the scattering alone, from submitting to done.",
-        scale: 1.0,
-        decimals: 2,
-        part: false,
-        optional: false,
         value: |mode| Some(mode.ms),
+        ..FIGURE
     },
     Figure {
         key: "ms_raster",
         name: "of which raster",
         unit: "ms",
         meaning: "Drawing the mesh into the atlas.",
-        scale: 1.0,
-        decimals: 2,
         part: true,
         optional: true,
         value: |mode| mode.ms_raster,
+        ..FIGURE
     },
     Figure {
         key: "ms_blur",
         name: "of which blur",
         unit: "ms",
         meaning: "Blurring the atlas, Gaussian by Gaussian.",
-        scale: 1.0,
-        decimals: 2,
         part: true,
         optional: true,
         value: |mode| mode.ms_blur,
+        ..FIGURE
     },
     Figure {
         key: "rel_rmse_vs_texture",
         name: "Relative RMSE",
         unit: "%",
         meaning: "Distance of the irradiance from texture space, over skin but for its rim.",
-        scale: 100.0,
-        decimals: 2,
-        part: false,
-        optional: false,
         value: |mode| mode.rel_rmse,
+        ..FIGURE
     },
     Figure {
         key: "rel_rmse_scattered_vs_texture",
         name: "where scattered",
         unit: "%",
         meaning: "The same over the pixels where scattering changes the irradiance by more than .01.",
-        scale: 100.0,
-        decimals: 2,
         part: true,
-        optional: false,
         value: |mode| mode.rel_rmse_scattered,
+        ..FIGURE
     },
     Figure {
         key: "rel_rmse_vs_eq7",
         name: "to Eq. 7",
         unit: "%",
         meaning: "The same distance from Eq. 7 over the whole mesh, each Gaussian divided by its mass.",
-        scale: 100.0,
-        decimals: 2,
         part: true,
         optional: true,
         value: |mode| mode.rel_rmse_eq7,
+        ..FIGURE
     },
     Figure {
         key: "max_error_vs_texture",
         name: "Largest error",
         unit: "linear",
         meaning: "Of any channel of the irradiance, on a linear scale where white is 1.",
-        scale: 1.0,
         decimals: 4,
-        part: false,
-        optional: false,
         value: |mode| mode.max_error,
+        ..FIGURE
     },
     Figure {
         key: "delta_e2000_p99_vs_texture",
         name: "Colour difference",
         unit: "ΔE2000",
         meaning: "99 % of the pixels are closer than this, before highlights. About 1 is just noticeable.",
-        scale: 1.0,
-        decimals: 2,
-        part: false,
-        optional: false,
         value: |mode| mode.delta_e2000_p99,
+        ..FIGURE
     },
     Figure {
         key: "flip_mean_vs_texture",
         name: "Mean FLIP",
         unit: "0 to 1",
         meaning: "Visible difference of the finished pictures when one flips between them.",
-        scale: 1.0,
         decimals: 4,
-        part: false,
-        optional: false,
         value: |mode| mode.flip_mean,
+        ..FIGURE
     },
     Figure {
         key: "energy_ratio",
@@ -209,11 +201,9 @@ const FIGURES: [Figure; 10] = [
         unit: "ratio",
         meaning: "Scattered over unscattered light, summed over the skin in view. \
                   Skin that moved light without loss shows 1.",
-        scale: 1.0,
         decimals: 4,
-        part: false,
-        optional: false,
         value: |mode| mode.energy_ratio,
+        ..FIGURE
     },
 ];
 
@@ -223,7 +213,8 @@ impl Figure {
     }
 
     fn text(&self, mode: &ModeReport) -> String {
-        let text = |value| format!("{:.*}", self.decimals, value * self.scale);
+        let scale = if self.unit == "%" { 100.0 } else { 1.0 };
+        let text = |value| format!("{:.*}", self.decimals, value * scale);
         self.value(mode).map_or("–".into(), text)
     }
 }

@@ -13,7 +13,7 @@ mod jimenez_2009;
 mod packed;
 mod pass;
 mod separable;
-#[cfg(test)]
+#[cfg(all(test, feature = "programs"))]
 mod tests;
 mod texture_2d;
 mod texture_cascade;

@@ -3,13 +3,13 @@
 
 use std::collections::HashMap;
 
-use glam::{DVec2, DVec3, DVec4, Mat4, Vec4};
+use glam::{DVec2, DVec3};
 use subsurface::wgpu::TextureFormat;
-use subsurface::{Atlas, Frame, Plan, Profile};
+use subsurface::{Plan, Profile};
 
 use super::edge::{scattered_step, step, terms};
-use crate::method::{self, AtlasMethod, Ours, OursUnrolled, ScreenMethod};
-use crate::renderer::Gpu;
+use crate::method::{Ours, OursUnrolled, ScreenMethod};
+use crate::synthetic::{GBuffer, Hit, View, gpu, plane, rgb, scatter_atlas, texels};
 
 const FORMAT: TextureFormat = TextureFormat::Rgba16Float;
 
@@ -21,97 +21,24 @@ const HALVES: f64 = 0.006;
 /// is.
 const SOFT_MM2: f64 = 0.0625;
 
-/// What lies behind a pixel.
-struct Hit {
-    depth_mm: f64,
-    irradiance: DVec3,
-    id: u8,
+/// A pixel, facing the camera.
+fn facing(point: DVec3, irradiance: DVec3, id: u32) -> Option<Hit> {
+    Some(Hit { point, normal: DVec3::Z, irradiance, id })
 }
 
-struct View {
-    size: [u32; 2],
-    projection: Mat4,
+/// A plane that faces the camera, all skin.
+fn wall(view: &View, depth_mm: f64, light: impl Fn(DVec2) -> f64) -> GBuffer {
+    view.shoot(plane(DVec3::Z, depth_mm, |p| DVec3::splat(light(p.truncate()))))
 }
 
-impl View {
-    fn orthographic(size: [u32; 2], px_per_mm: f64) -> Self {
-        let scale = |pixels: u32| (2.0 * px_per_mm / f64::from(pixels)) as f32;
-        Self {
-            size,
-            projection: Mat4::from_cols(
-                Vec4::new(scale(size[0]), 0.0, 0.0, 0.0),
-                Vec4::new(0.0, scale(size[1]), 0.0, 0.0),
-                Vec4::new(0.0, 0.0, -1e-3, 0.0),
-                Vec4::W,
-            ),
-        }
-    }
-
-    /// Infinite and reversed; `zoom` is P₀₀ and P₁₁.
-    fn perspective(size: [u32; 2], zoom: [f32; 2]) -> Self {
-        Self {
-            size,
-            projection: Mat4::from_cols(
-                Vec4::new(zoom[0], 0.0, 0.0, 0.0),
-                Vec4::new(0.0, zoom[1], 0.0, 0.0),
-                Vec4::new(0.0, 0.0, 0.0, -1.0),
-                Vec4::new(0.0, 0.0, 10.0, 0.0),
-            ),
-        }
-    }
-
-    /// Centre of each pixel, −1 to 1, y up.
-    fn ndc(&self) -> impl Iterator<Item = DVec2> {
-        let [width, height] = self.size;
-        let centres = move |y| (0..width).map(move |x| DVec2::new(x.into(), f64::from(y)) + 0.5);
-        (0..height).flat_map(centres).map(move |p| {
-            let uv = p / DVec2::new(width.into(), height.into());
-            DVec2::new(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y)
-        })
-    }
-
-    /// The view-space mm of each pixel on a plane that faces the camera.
-    fn facing(&self, depth_mm: f64) -> impl Iterator<Item = DVec2> {
-        let p = self.projection.as_dmat4();
-        let w = p.z_axis.w * -depth_mm + p.w_axis.w;
-        self.ndc().map(move |ndc| ndc * w / DVec2::new(p.x_axis.x, p.y_axis.y))
-    }
-
-    fn scatter(&self, method: &mut dyn ScreenMethod, hits: &[Hit]) -> Vec<[f32; 4]> {
-        let gpu = gpu();
-        let color = |h: &Hit| h.irradiance.as_vec3().extend(0.5).to_array();
-        let irradiance: Vec<_> = hits.iter().map(color).collect();
-        let p = self.projection.as_dmat4();
-        let depth = |h: &Hit| {
-            let clip = p * DVec4::new(0.0, 0.0, -h.depth_mm, 1.0);
-            (clip.z / clip.w) as f32
-        };
-        let depth: Vec<_> = hits.iter().map(depth).collect();
-        let id: Vec<_> = hits.iter().map(|h| h.id).collect();
-        let size = self.size;
-        let output = gpu.target("output", size, FORMAT);
-        let irradiance = gpu.upload("irradiance", size, TextureFormat::Rgba32Float, &irradiance);
-        let depth = gpu.upload("depth", size, TextureFormat::R32Float, &depth);
-        let id = gpu.upload("profile id", size, TextureFormat::R8Uint, &id);
-        let mut frame = Frame::new(&irradiance, &depth, self.projection.to_cols_array_2d());
-        frame.profile_id = Some(&id);
-        frame.mm_per_unit = 1.0;
-        method::scatter(gpu, method, &frame, &output).unwrap();
-        gpu.read(&output)
-    }
-}
-
-fn gpu() -> &'static Gpu {
-    static GPU: std::sync::OnceLock<Gpu> = std::sync::OnceLock::new();
-    GPU.get_or_init(|| Gpu::headless().unwrap_or_else(|error| panic!("{error}")))
+/// With the points of its pixels in the view's plane.
+fn scatter(method: &mut dyn ScreenMethod, g: &GBuffer) -> (Vec<DVec2>, Vec<[f32; 4]>) {
+    let points = g.hits.iter().map(|h| h.expect("all is hit").point.truncate());
+    (points.collect(), g.scatter_to(method, FORMAT))
 }
 
 fn rivals() -> Vec<super::Screen> {
     super::screen(&gpu().device, FORMAT, &Profile::SKIN).unwrap()
-}
-
-fn rgb(pixel: &[f32; 4]) -> DVec3 {
-    DVec3::new(pixel[0].into(), pixel[1].into(), pixel[2].into())
 }
 
 #[test]
@@ -120,28 +47,24 @@ fn constant_light_stays_constant_and_background_as_it_was() {
     // Values that a half float holds exactly, so that background comes out bit for bit.
     let skin = DVec3::new(0.75, 0.5, 0.25);
     let behind = DVec3::new(4.0, 8.0, 2.0);
-    for view in [View::perspective([240, 160], [2.0, 3.0]), View::orthographic([240, 160], 4.0)] {
-        let hits: Vec<_> = view
-            .ndc()
-            .map(|at| {
-                let hole = (9.0 * at.x).sin() * (7.0 * at.y).sin() > 0.5;
-                let layer = if at.x > 0.6 { 30.0 } else { 0.0 };
-                Hit {
-                    depth_mm: if hole { 1e6 } else { 90.0 + 12.0 * at.x - layer },
-                    irradiance: if hole { behind } else { skin },
-                    id: u8::from(!hole),
-                }
-            })
-            .collect();
+    for view in [View::perspective([240, 160], 36.87), View::orthographic([240, 160], 4.0)] {
+        let to_clip = DVec2::new(view.projection.x_axis.x, view.projection.y_axis.y);
+        let g = view.shoot(|origin, ray| {
+            let at = (origin + ray).truncate() * to_clip;
+            let hole = (9.0 * at.x).sin() * (7.0 * at.y).sin() > 0.5;
+            let layer = if at.x > 0.6 { 30.0 } else { 0.0 };
+            let depth_mm = if hole { 1e6 } else { 90.0 + 12.0 * at.x - layer };
+            facing(origin + ray * depth_mm, if hole { behind } else { skin }, u32::from(!hole))
+        });
         for (name, setting, mut method) in rivals() {
-            let out = view.scatter(&mut *method, &hits);
+            let (_, out) = scatter(&mut *method, &g);
             let mut worst: f64 = 0.0;
-            for (found, hit) in out.iter().zip(&hits) {
+            for (found, hit) in out.iter().zip(g.hits.iter().flatten()) {
                 assert_eq!(found[3], 0.5, "{name} {setting}");
                 if hit.id == 0 {
-                    assert_eq!(rgb(found), behind, "{name} {setting}");
+                    assert_eq!(rgb(*found), behind, "{name} {setting}");
                 } else {
-                    worst = worst.max(((rgb(found) - skin) / skin).abs().max_element());
+                    worst = worst.max(((rgb(*found) - skin) / skin).abs().max_element());
                 }
             }
             println!("{name} {setting}: constant light off by {worst:.5}");
@@ -157,17 +80,12 @@ fn edge_error(method: &mut dyn ScreenMethod, px_per_mm: f64, degrees: f64) -> (f
     let view = View::orthographic([pixels; 2], px_per_mm);
     let across = DVec2::from_angle(degrees.to_radians());
     let soft_mm2 = px_per_mm.powi(-2);
-    let points: Vec<_> = view.facing(300.0).collect();
-    let hits: Vec<_> = points
-        .iter()
-        .map(|p| Hit { depth_mm: 300.0, irradiance: DVec3::splat(step(p.dot(across), soft_mm2)), id: 1 })
-        .collect();
-    let out = view.scatter(method, &hits);
+    let (points, out) = scatter(method, &wall(&view, 300.0, |p| step(p.dot(across), soft_mm2)));
     let skin = terms(&Profile::SKIN);
     let (mut worst, mut squares, mut count) = (0f64, 0.0, 0.0);
     for (found, p) in out.iter().zip(&points) {
         if p.abs().max_element() < 10.0 {
-            let error = rgb(found) - scattered_step(p.dot(across), soft_mm2, &skin);
+            let error = rgb(*found) - scattered_step(p.dot(across), soft_mm2, &skin);
             worst = worst.max(error.abs().max_element());
             // Near the edge, where there is something to get wrong.
             if p.dot(across).abs() < 4.0 {
@@ -203,12 +121,7 @@ fn rivals_beat_no_scattering_on_an_edge() {
 
 /// The mm between a quarter and three quarters of red on an edge across x or y.
 fn width_mm(method: &mut dyn ScreenMethod, view: &View, depth_mm: f64, axis: usize) -> f64 {
-    let points: Vec<_> = view.facing(depth_mm).collect();
-    let hits: Vec<_> = points
-        .iter()
-        .map(|p| Hit { depth_mm, irradiance: DVec3::splat(step(p[axis], SOFT_MM2)), id: 1 })
-        .collect();
-    let out = view.scatter(method, &hits);
+    let (points, out) = scatter(method, &wall(view, depth_mm, |p| step(p[axis], SOFT_MM2)));
     // The mean along the edge, away from the frame's own.
     let mut columns: Vec<(f64, f64, f64)> = Vec::new();
     let mut order: Vec<_> = points.iter().zip(&out).collect();
@@ -239,7 +152,8 @@ fn width_mm(method: &mut dyn ScreenMethod, view: &View, depth_mm: f64, axis: usi
 #[test]
 fn widths_are_in_mm_on_both_axes() {
     // Pixels half as wide as high: 16 and 8 px/mm near, 8 and 4 px/mm far.
-    let view = View::perspective([640, 320], [6.0, 6.0]);
+    let mut view = View::perspective([640, 320], 18.92);
+    view.projection.x_axis.x = view.projection.y_axis.y;
     for (name, setting, mut method) in rivals() {
         if name == "copy" {
             continue;
@@ -310,48 +224,21 @@ fn kernels_are_as_near_to_skin_as_they_get() {
     println!("fits: {:.1?}", start.elapsed());
 }
 
-/// A texel's position in mm and its irradiance; `None` off the islands.
-type Texel = Option<(DVec3, DVec3)>;
-
-fn scatter_atlas(method: &mut dyn AtlasMethod, size: u32, texel: impl Fn(DVec2) -> Texel) -> Vec<[f32; 4]> {
-    let gpu = gpu();
-    let (mut irradiance, mut positions) = (Vec::new(), Vec::new());
-    for t in texels(size) {
-        let found = texel(t);
-        let (p, e) = found.unwrap_or_default();
-        irradiance.push(e.as_vec3().extend(0.5).to_array());
-        let id = if found.is_some() { 1.0 } else { 0.0 };
-        positions.push((p * 1e-3).as_vec3().extend(id).to_array());
-    }
-    let floats = TextureFormat::Rgba32Float;
-    let output = gpu.target("output", [size; 2], FORMAT);
-    let irradiance = gpu.upload("irradiance", [size; 2], floats, &irradiance);
-    let positions = gpu.upload("positions", [size; 2], floats, &positions);
-    let atlas = Atlas::new(&irradiance, &positions);
-    method::scatter_atlas(gpu, method, &atlas, &output).unwrap();
-    gpu.read(&output)
-}
-
-/// The centre of each texel.
-fn texels(size: u32) -> impl Iterator<Item = DVec2> {
-    let row = move |y| (0..size).map(move |x| DVec2::new(x.into(), f64::from(y)) + 0.5);
-    (0..size).flat_map(row)
-}
-
 #[test]
 fn atlas_rivals_keep_constant_light_and_fill_the_gutter() {
     let size = 64;
     let e = DVec3::new(0.75, 0.5, 0.25);
     let inside = |t: DVec2| (t - 32.0).abs().max_element() < 16.0;
     for (name, _, mut method) in super::atlas(&gpu().device, FORMAT, &Profile::SKIN) {
-        let out = scatter_atlas(&mut *method, size, |t| inside(t).then(|| ((t * 0.2).extend(0.0), e)));
+        let out =
+            scatter_atlas(&mut *method, FORMAT, size, |t| inside(t).then(|| ((t * 0.2).extend(0.0), e)));
         for (found, t) in out.iter().zip(texels(size)) {
             let outside = (t - 32.0).abs().max_element() - 16.0;
             if outside < 4.0 {
-                let error = ((rgb(found) - e) / e).abs().max_element();
+                let error = ((rgb(*found) - e) / e).abs().max_element();
                 assert!(error <= HALVES, "{name} at {t}: {found:?}");
             } else {
-                assert_eq!(rgb(found), DVec3::ZERO, "{name} at {t}");
+                assert_eq!(rgb(*found), DVec3::ZERO, "{name} at {t}");
             }
             assert_eq!(found[3], 0.5, "{name} at {t}");
         }
@@ -378,12 +265,12 @@ fn atlas_rivals_beat_no_scattering_on_an_edge() {
                 let place = |t: DVec2| (t.x - 80.0) * u + (t.y - 80.0) * v;
                 let light = |t: DVec2| DVec3::splat(step(place(t).dot(across), soft_mm2));
                 let texel = |t: DVec2| Some((place(t).extend(7.0), light(t)));
-                let out = scatter_atlas(&mut *method, size, texel);
+                let out = scatter_atlas(&mut *method, FORMAT, size, texel);
                 let (mut worst, mut none) = (0f64, 0f64);
                 for (found, t) in out.iter().zip(texels(size)) {
                     if (t - 80.0).abs().max_element() < 32.0 {
                         let truth = scattered_step(place(t).dot(across), soft_mm2, &skin);
-                        worst = worst.max((rgb(found) - truth).abs().max_element());
+                        worst = worst.max((rgb(*found) - truth).abs().max_element());
                         none = none.max((light(t) - truth).abs().max_element());
                     }
                 }

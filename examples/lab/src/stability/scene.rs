@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 use subsurface::Profile;
 
 use crate::stability::unwrapped::{Texel, Unwrapped};
+pub use crate::synthetic::direction;
 use crate::synthetic::{GBuffer, Hit, View, tilted_normal};
 use crate::truth::closed_form::{scattered_cosine, scattered_cosine_around, scattered_step, step};
 
@@ -254,11 +255,6 @@ impl Scene {
         let at = self.0[surface].form.uv(point - self.0[surface].middle_mm);
         DVec2::new((surface as f64 + at.x) / self.0.len() as f64, at.y)
     }
-}
-
-/// A direction in the picture.
-pub fn direction(degrees: f64) -> DVec3 {
-    DVec2::from_angle(degrees.to_radians()).extend(0.0)
 }
 
 /// A direction `degrees` from the camera's, towards `side` in the picture.
