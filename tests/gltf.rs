@@ -47,6 +47,12 @@ fn read(change: impl FnOnce(&mut Model)) -> Result<Scene, Error> {
     Scene::from_glb(&model.glb())
 }
 
+fn require(model: &mut Model, extension: &str) {
+    for place in ["/extensionsRequired", "/extensionsUsed"] {
+        model.set(place, json!([extension]));
+    }
+}
+
 fn bounds(scene: &Scene) -> [[f32; 3]; 2] {
     let (min, max) = scene.bounds();
     [min, max].map(|v| v.to_array().map(|x| (1e4 * x).round() / 1e4))
@@ -159,23 +165,24 @@ fn numbers_may_be_quantised() {
         m.json["accessors"][positions]["min"] = json!([0, 0, 0]);
         m.json["accessors"][positions]["max"] = json!([1, 1, 1]);
         m.set(&format!("{ATTRIBUTES}/POSITION"), json!(positions));
-        m.set("/extensionsRequired", json!(["KHR_mesh_quantization"]));
-        m.set("/extensionsUsed", json!(["KHR_mesh_quantization"]));
+        require(m, "KHR_mesh_quantization");
     });
     assert_eq!(bounds(&small), [[0.0; 3], [1.0, 0.5, 0.0]]);
 }
 
+/// The square by another list of triangles.
+fn indexed(list: &[u16]) -> Result<Scene, Error> {
+    read(|m| {
+        let indices = accessor(m, list, 5123, "SCALAR", list.len());
+        m.set("/meshes/0/primitives/0/indices", json!(indices));
+    })
+}
+
 #[test]
 fn what_is_left_of_a_list_of_triangles_is_left_out() {
-    let indices = |list: &[u16]| {
-        read(|m| {
-            let indices = accessor(m, list, 5123, "SCALAR", list.len());
-            m.set("/meshes/0/primitives/0/indices", json!(indices));
-        })
-    };
-    let seven = indices(&[0, 1, 2, 1, 3, 2, 0]).unwrap();
+    let seven = indexed(&[0, 1, 2, 1, 3, 2, 0]).unwrap();
     assert_eq!(seven.primitives[0].indices, [0, 1, 2, 1, 3, 2]);
-    assert!(indices(&[0, 1]).unwrap_err().to_string().contains("no triangles"));
+    assert!(indexed(&[0, 1]).unwrap_err().to_string().contains("no triangles"));
 }
 
 #[test]
@@ -258,8 +265,7 @@ fn an_image_may_be_a_webp() {
     let scene = scene(|m| {
         m.set_picture(&picture(ImageFormat::WebP));
         m.set("/textures/0", json!({"extensions": {"EXT_texture_webp": {"source": 0}}}));
-        m.set("/extensionsRequired", json!(["EXT_texture_webp"]));
-        m.set("/extensionsUsed", json!(["EXT_texture_webp"]));
+        require(m, "EXT_texture_webp");
     });
     assert_eq!(scene.images[0].rgba8[..8], [128, 0, 0, 255, 128, 100, 0, 255]);
 }
@@ -350,17 +356,9 @@ fn what_lets_light_through_is_not_drawn() {
 #[test]
 fn a_refusal_blames_what_is_wrong() {
     let required = |name: &str| {
-        let name = json!([name]);
         read(|m| {
-            m.set("/extensionsRequired", name.clone());
-            m.set("/extensionsUsed", name);
+            require(m, name);
             m.set("/accessors/0/bufferView", Value::Null);
-        })
-    };
-    let indices = |list: [u16; 3]| {
-        read(|m| {
-            let indices = accessor(m, &list, 5123, "SCALAR", 3);
-            m.set("/meshes/0/primitives/0/indices", json!(indices));
         })
     };
     let set = |place: &str, value: Value| read(|m| m.set(place, value));
@@ -382,8 +380,8 @@ fn a_refusal_blames_what_is_wrong() {
         ),
         (set("/accessors/0/bufferView", Value::Null), "square: got POSITION without bytes"),
         (read(|m| m.set_picture(b"RIFF")), "image 0: got"),
-        (indices([0, 1, 9]), "square: got index 9 of 4 vertices"),
-        (indices([1, 1, 2]), "glTF: got nothing to draw (left out: square, which has no triangles)"),
+        (indexed(&[0, 1, 9]), "square: got index 9 of 4 vertices"),
+        (indexed(&[1, 1, 2]), "glTF: got nothing to draw (left out: square, which has no triangles)"),
         (set("/meshes/0/primitives/0/indices", json!(2)), "square: got indices of F32"),
         (set("/accessors/2/count", json!(3)), "square: got 3 elements of TEXCOORD_0 for 4 of POSITION"),
         (set("/accessors/0/type", json!("VEC2")), "mesh square: got POSITION of VEC2 of F32, needs VEC3"),

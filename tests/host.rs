@@ -7,7 +7,7 @@ use glam::{DMat4, DVec3, DVec4, Mat4};
 use subsurface::wgpu::{self, CommandEncoder, TextureFormat, TextureView};
 use subsurface::{Frame, Output, Plan, Profile, ScreenSpace, Viewport};
 use subsurface_lab::renderer::Gpu;
-use subsurface_lab::synthetic::{View, gpu, largest, plane, sphere};
+use subsurface_lab::synthetic::{View, apart, gpu, plane, sphere};
 use subsurface_lab::truth::closed_form::step;
 
 const SIZE: [u32; 2] = [96, 80];
@@ -168,11 +168,6 @@ fn halves(pixels: &[[f32; 4]]) -> Vec<[u16; 4]> {
     pixels.iter().map(|p| p.map(bits)).collect()
 }
 
-fn largest_difference(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
-    let channels = a.iter().zip(b).flat_map(|(a, b)| a.iter().zip(b));
-    largest(channels.map(|(a, b)| f64::from(a - b).abs()))
-}
-
 #[test]
 fn a_viewport_is_a_frame_of_its_own() {
     let alone = Scene::new();
@@ -189,7 +184,7 @@ fn a_viewport_is_a_frame_of_its_own() {
     for planned in [false, true] {
         let shared = Asked { strength: Some(&strength_alone), ..Asked::default() };
         let truth = alone.scattered(planned, shared);
-        assert!(largest_difference(&truth, &alone.irradiance) > 0.02);
+        assert!(apart(&truth, &alone.irradiance) > 0.02);
         let before = vec![around; more.depth.len()];
         let in_place = Asked { viewport: Some(PLACE), strength: Some(&strength_more), ..Asked::default() };
         let out = more.scatter(planned, HALF.into(), &before, in_place);
@@ -453,7 +448,7 @@ fn the_far_plane_is_told_from_the_near_one() {
             }
             let left: Vec<usize> = (0..out.len()).filter(|i| i % SIZE[0] as usize <= 50).collect();
             let pick = |all: &[[f32; 4]]| left.iter().map(|i| all[*i]).collect::<Vec<_>>();
-            let changed = largest_difference(&pick(&out), &pick(&flat.irradiance));
+            let changed = apart(&pick(&out), &pick(&flat.irradiance));
             assert!(changed > 0.02, "{name}, planned: {planned}: {changed}");
         }
     }
@@ -518,7 +513,7 @@ fn sums_in_place_are_what_a_final_pass_would_add() {
         let added = scene.scatter(planned, Output::AddScattered(HALF), &specular, Asked::default());
         let changed = scene.scatter(planned, Output::AddDifference(HALF), &lit, Asked::default());
         // Up to three roundings of half floats, or truncations, of steps of .001 from 1 to 2.
-        let worst = [&added, &changed].map(|out| largest_difference(out, &expected));
+        let worst = [&added, &changed].map(|out| apart(out, &expected));
         println!("planned: {planned}, off by {worst:?}");
         assert!(worst[0].max(worst[1]) <= 0.003, "{worst:?}");
         // What does not scatter is not touched.
@@ -548,7 +543,7 @@ fn albedo_multiplies_what_is_added() {
         let added = scene.scatter(planned, Output::AddScattered(HALF), &nothing, asked());
         let changed = scene.scatter(planned, Output::AddDifference(HALF), &lit, asked());
         // Up to three roundings of half floats, or truncations, of steps of .0005 below 1.
-        let worst = [&added, &changed].map(|out| largest_difference(out, &wanted));
+        let worst = [&added, &changed].map(|out| apart(out, &wanted));
         println!("planned: {planned}, off by {worst:?}");
         assert!(worst[0].max(worst[1]) <= 0.0015, "{worst:?}");
     }

@@ -393,6 +393,12 @@ pub fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
     numbers.into_iter().reduce(larger).expect("there is something to take the largest of")
 }
 
+/// The largest difference between two frames; NaN where one is.
+pub fn apart(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
+    let pairs = a.iter().flatten().zip(b.iter().flatten());
+    largest(pairs.map(|(a, b)| f64::from((a - b).abs())))
+}
+
 /// Rotates the normal (0, 0, 1) by `tilt` about the image axis at `axis`, both in degrees.
 pub fn tilted_normal(tilt: f64, axis: f64) -> DVec3 {
     let axis = axis.to_radians();

@@ -133,15 +133,16 @@ impl Stage {
             None => Set::new(self, &request.look)?,
         };
         set.draw(self, &request.look)?;
+        let with = &mut With { stage: self, effects, look: &request.look };
         let mut pictures = Vec::new();
         for layer in &request.look.layers {
-            pictures.push(set.picture(self, effects, &request.look, *layer)?);
+            pictures.push(set.picture(with, *layer)?);
         }
         if request.measure {
-            set.measure(self, effects, &request.look)?;
+            set.measure(with)?;
         }
         if request.time_passes {
-            set.time_passes(self, effects, &request.look)?;
+            set.time_passes(with)?;
         }
         let shots = &set.view.shots;
         let frame = Frame {
@@ -172,6 +173,13 @@ struct Effects {
     overlay: Option<Overlay>,
     /// What each took last.
     last_ms: HashMap<Layer, f64>,
+}
+
+/// What layers are made of.
+struct With<'a> {
+    stage: &'a Stage,
+    effects: &'a mut Effects,
+    look: &'a Look,
 }
 
 /// All that is made for one size of picture.
@@ -283,31 +291,25 @@ impl Set {
     }
 
     /// The layer or, where it cannot be had, the light as it fell and why.
-    fn picture(
-        &mut self,
-        stage: &Stage,
-        effects: &mut Effects,
-        look: &Look,
-        layer: Layer,
-    ) -> Result<Arc<Picture>, Error> {
+    fn picture(&mut self, with: &mut With, layer: Layer) -> Result<Arc<Picture>, Error> {
         // Levels are drawn over what the plan scatters.
         let effect = if layer == Layer::Level { Layer::Screen } else { layer };
-        let last_ms = effects.last_ms.get(&effect).copied().unwrap_or(0.0);
+        let last_ms = with.effects.last_ms.get(&effect).copied().unwrap_or(0.0);
         let is_known = self.view.shots.contains_key(&layer);
         let is_planned = matches!(layer, Layer::Screen | Layer::Level);
-        let why = if is_planned && look.plan.is_none() {
+        let why = if is_planned && with.look.plan.is_none() {
             "no plan is fitted yet".to_owned()
-        } else if look.is_moving && last_ms > PATIENCE_MS && !is_known {
+        } else if with.look.is_moving && last_ms > PATIENCE_MS && !is_known {
             format!("{} follows at rest", layer.title())
         } else {
-            match self.shot(stage, effects, look, layer) {
+            match self.shot(with, layer) {
                 Ok(shot) => return Ok(shot.picture),
                 // Some models cannot have it.
                 Err(error) if layer == Layer::Texture => error.to_string(),
                 Err(error) => return Err(error),
             }
         };
-        let plain = self.shot(stage, effects, look, Layer::None)?.picture;
+        let plain = self.shot(with, Layer::None)?.picture;
         Ok(Arc::new(Picture {
             title: format!("{} ({why})", plain.title),
             image: plain.image.clone(),
@@ -315,51 +317,41 @@ impl Set {
         }))
     }
 
-    fn shot(
-        &mut self,
-        stage: &Stage,
-        effects: &mut Effects,
-        look: &Look,
-        layer: Layer,
-    ) -> Result<Shot, Error> {
+    fn shot(&mut self, with: &mut With, layer: Layer) -> Result<Shot, Error> {
         if let Some(shot) = self.view.shots.get(&layer) {
             return Ok(shot.clone());
         }
         let shot = match layer {
-            Layer::Width => self.width(stage, look)?,
-            Layer::Level => self.level(stage, effects, look)?,
-            _ => self.scatter(stage, effects, look, layer)?,
+            Layer::Width => self.width(with.stage, with.look)?,
+            Layer::Level => self.level(with)?,
+            _ => self.scatter(with, layer)?,
         };
         self.view.shots.insert(layer, shot.clone());
         Ok(shot)
     }
 
-    fn scatter(
-        &mut self,
-        stage: &Stage,
-        effects: &mut Effects,
-        look: &Look,
-        layer: Layer,
-    ) -> Result<Shot, Error> {
-        let Scattered { title, irradiance, taken_ms } =
-            self.run_effect(stage, effects, look, layer, None)?;
-        let time =
-            taken_ms.map(|ms| Time { layer, ms, is_first: effects.last_ms.insert(layer, ms).is_none() });
+    fn scatter(&mut self, with: &mut With, layer: Layer) -> Result<Shot, Error> {
+        let Scattered { title, irradiance, taken_ms } = self.run_effect(with, layer, None)?;
+        let time = taken_ms.map(|ms| Time {
+            layer,
+            ms,
+            is_first: with.effects.last_ms.insert(layer, ms).is_none(),
+        });
         let since = Instant::now();
-        let pixels = self.renderer.compose(&stage.gpu, &irradiance, Shown::Picture, 1.0);
+        let pixels = self.renderer.compose(&with.stage.gpu, &irradiance, Shown::Picture, 1.0);
         self.view.compose_ms = Some(ms(since));
         Ok(Shot { irradiance: Some(irradiance), time, ..self.drawn(title, pixels, None)? })
     }
 
     /// Runs the effects that are shown once more, and has the device time their passes.
-    fn time_passes(&mut self, stage: &Stage, effects: &mut Effects, look: &Look) -> Result<(), Error> {
-        for layer in look.layers.iter().filter(|layer| layer.has_passes()) {
+    fn time_passes(&mut self, with: &mut With) -> Result<(), Error> {
+        for layer in with.look.layers.iter().filter(|layer| layer.has_passes()) {
             // None where it could not be had; and whoever was shown has compiled.
             if !self.view.shots.contains_key(layer) {
                 continue;
             }
             let mut passes = Vec::new();
-            self.run_effect(stage, effects, look, *layer, Some(&mut passes))?;
+            self.run_effect(with, *layer, Some(&mut passes))?;
             if let Some(shot) = self.view.shots.get_mut(layer) {
                 shot.passes = Some(passes);
             }
@@ -370,32 +362,30 @@ impl Set {
     /// `passes` takes the times of the effect's passes, where they are asked for and the device has them.
     fn run_effect(
         &mut self,
-        stage: &Stage,
-        effects: &mut Effects,
-        look: &Look,
+        with: &mut With,
         layer: Layer,
         passes: Option<&mut Vec<Pass>>,
     ) -> Result<Scattered, Error> {
         let fallen = &self.renderer.gbuffer.irradiance;
         let mut title = layer.title().to_owned();
-        let plan = match (layer, &look.plan) {
+        let plan = match (layer, &with.look.plan) {
             (Layer::Screen, Some(plan)) => {
                 title = format!("{title} at {:.4}", plan.max_error());
                 Some((**plan).clone())
             }
-            (Layer::Exact, _) => Some(Plan::exact(&[look.profile])?),
+            (Layer::Exact, _) => Some(Plan::exact(&[with.look.profile])?),
             (Layer::Texture, _) => None,
             _ => {
                 return Ok(Scattered { title, irradiance: fallen.clone(), taken_ms: None });
             }
         };
-        self.outputs.entry(layer).or_insert_with(|| self.renderer.scattered_target(&stage.gpu));
+        self.outputs.entry(layer).or_insert_with(|| self.renderer.scattered_target(&with.stage.gpu));
         let since = Instant::now();
         match plan {
-            Some(plan) => self.run_plan(stage, effects, look, (layer, &plan), passes)?,
+            Some(plan) => self.run_plan(with, (layer, &plan), passes)?,
             None => {
-                title = format!("{title}, {0}×{0}", stage.texture_size);
-                self.run_atlas(stage, effects, look, passes)?;
+                title = format!("{title}, {0}×{0}", with.stage.texture_size);
+                self.run_atlas(with, passes)?;
             }
         }
         Ok(Scattered { title, irradiance: self.outputs[&layer].clone(), taken_ms: Some(ms(since)) })
@@ -403,60 +393,52 @@ impl Set {
 
     fn run_plan(
         &self,
-        stage: &Stage,
-        effects: &mut Effects,
-        look: &Look,
+        with: &mut With,
         (layer, plan): (Layer, &Plan),
         passes: Option<&mut Vec<Pass>>,
     ) -> Result<(), Error> {
-        let (gpu, output) = (&stage.gpu, &self.outputs[&layer]);
+        let (gpu, output) = (&with.stage.gpu, &self.outputs[&layer]);
         let format = output.texture().format();
-        let ours = match effects.screen.entry(layer) {
+        let ours = match with.effects.screen.entry(layer) {
             Entry::Occupied(kept) => kept.into_mut(),
             Entry::Vacant(none) => none.insert(Ours::new(&gpu.device, format, plan)?),
         };
         if ours.effect.plan() != plan {
             ours.effect = ScreenSpace::new(&gpu.device, format, plan)?;
         }
-        let projection = look.camera.projection(self.size);
-        let mut frame = self.renderer.gbuffer.frame(projection, stage.mm_per_unit);
-        frame.back = self.back.as_ref().filter(|_| look.has_back).map(BackRenderer::layer);
+        let projection = with.look.camera.projection(self.size);
+        let mut frame = self.renderer.gbuffer.frame(projection, with.stage.mm_per_unit);
+        frame.back = self.back.as_ref().filter(|_| with.look.has_back).map(BackRenderer::layer);
         let Ours { effect, view } = ours;
         view.prepare(&gpu.device, &gpu.queue, effect, &frame)?;
-        let times = effects.timestamps.as_ref().zip(passes);
+        let times = with.effects.timestamps.as_ref().zip(passes);
         passes::run(gpu, times, |encoder, queries| match queries {
             Some(queries) => view.render_timed(encoder, output, queries, 0),
             None => view.render(encoder, output).map(|()| Vec::new()),
         })
     }
 
-    fn run_atlas(
-        &mut self,
-        stage: &Stage,
-        effects: &mut Effects,
-        look: &Look,
-        mut passes: Option<&mut Vec<Pass>>,
-    ) -> Result<(), Error> {
-        let (gpu, output) = (&stage.gpu, &self.outputs[&Layer::Texture]);
+    fn run_atlas(&mut self, with: &mut With, mut passes: Option<&mut Vec<Pass>>) -> Result<(), Error> {
+        let (gpu, output) = (&with.stage.gpu, &self.outputs[&Layer::Texture]);
         let format = output.texture().format();
-        let effect = match effects.texture.take() {
-            Some((profile, effect)) if profile == look.profile => effect,
-            _ => OursUnrolled::new(&gpu.device, format, &[look.profile])?,
+        let effect = match with.effects.texture.take() {
+            Some((profile, effect)) if profile == with.look.profile => effect,
+            _ => OursUnrolled::new(&gpu.device, format, &[with.look.profile])?,
         };
-        let (_, OursUnrolled { effect, view }) = effects.texture.insert((look.profile, effect));
+        let (_, OursUnrolled { effect, view }) = with.effects.texture.insert((with.look.profile, effect));
         if self.atlas.is_none() {
-            self.atlas = Some(AtlasRenderer::new(gpu, &self.renderer, stage.texture_size)?);
+            self.atlas = Some(AtlasRenderer::new(gpu, &self.renderer, with.stage.texture_size)?);
         }
         let scatter = |atlas: &Atlas, to: &TextureView| {
             view.prepare(&gpu.device, &gpu.queue, effect, atlas)?;
-            let times = effects.timestamps.as_ref().zip(passes.as_deref_mut());
+            let times = with.effects.timestamps.as_ref().zip(passes.as_deref_mut());
             passes::run(gpu, times, |encoder, queries| match queries {
                 Some(queries) => view.render_timed(encoder, to, queries, 0),
                 None => view.render(encoder, to).map(|()| Vec::new()),
             })
         };
         if let Some(atlas) = &self.atlas {
-            atlas.render(gpu, &self.renderer, 1, stage.mm_per_unit, output, scatter)?;
+            atlas.render(gpu, &self.renderer, 1, with.stage.mm_per_unit, output, scatter)?;
         }
         Ok(())
     }
@@ -473,25 +455,25 @@ impl Set {
     }
 
     /// What the library shows of the plan's levels, over the picture.
-    fn level(&mut self, stage: &Stage, effects: &mut Effects, look: &Look) -> Result<Shot, Error> {
-        let shot = self.shot(stage, effects, look, Layer::Screen)?;
-        let gpu = &stage.gpu;
+    fn level(&mut self, with: &mut With) -> Result<Shot, Error> {
+        let shot = self.shot(with, Layer::Screen)?;
+        let gpu = &with.stage.gpu;
         let target = self.renderer.picture_target(gpu);
         if let Some(light) = &shot.irradiance {
             let columns = 0..self.size[0];
             self.renderer.draw_picture(gpu, light, Shown::Picture, 1.0, columns, &target);
         }
-        let overlay = match effects.overlay.take() {
+        let overlay = match with.effects.overlay.take() {
             Some(overlay) => overlay,
             None => Overlay::new(&gpu.device, target.texture().format())?,
         };
-        let overlay = effects.overlay.insert(overlay);
-        if let Some(Ours { view, .. }) = effects.screen.get(&Layer::Screen) {
+        let overlay = with.effects.overlay.insert(overlay);
+        if let Some(Ours { view, .. }) = with.effects.screen.get(&Layer::Screen) {
             gpu.run(|encoder| overlay.render(&gpu.device, encoder, view, Show::Level, &target))?;
         }
         let pixels = gpu.read_bytes(target.texture());
         let pixels = pixels.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect();
-        let error = look.plan.as_ref().map_or(0.0, |plan| plan.max_error());
+        let error = with.look.plan.as_ref().map_or(0.0, |plan| plan.max_error());
         let title = format!("{} at {error:.4}", Layer::Level.title());
         self.drawn(title, pixels, Some(Legend::Levels))
     }
@@ -506,14 +488,14 @@ impl Set {
     }
 
     /// Holds what is cheap, and what is there, to the exact sum.
-    fn measure(&mut self, stage: &Stage, effects: &mut Effects, look: &Look) -> Result<(), Error> {
+    fn measure(&mut self, with: &mut With) -> Result<(), Error> {
         let mut layers = vec![Layer::None];
         if self.view.shots.contains_key(&Layer::Texture) {
             layers.push(Layer::Texture);
         }
         // While a plan is on its way, the old one may be of another profile.
-        let plan = look.plan.as_ref();
-        if plan.is_some_and(|plan| plan.profiles() == [look.profile]) {
+        let plan = with.look.plan.as_ref();
+        if plan.is_some_and(|plan| plan.profiles() == [with.look.profile]) {
             layers.push(Layer::Screen);
         }
         // Whoever asks for figures wants no first run among the times.
@@ -521,10 +503,10 @@ impl Set {
         self.view.shots.retain(|_, shot| !is_first(shot));
 
         let [width, height] = self.size;
-        let skin = metrics::erode(&self.skin(stage), width, height, 2);
+        let skin = metrics::erode(&self.skin(with.stage), width, height, 2);
         let mut light = |layer| -> Result<metrics::Layer, Error> {
-            let shot = self.shot(stage, effects, look, layer)?;
-            let pixels = shot.irradiance.iter().flat_map(|v| stage.gpu.read(v));
+            let shot = self.shot(with, layer)?;
+            let pixels = shot.irradiance.iter().flat_map(|v| with.stage.gpu.read(v));
             Ok(metrics::Layer { width, height, pixels: pixels.map(|[r, g, b, _]| [r, g, b]).collect() })
         };
         let exact = light(Layer::Exact)?;

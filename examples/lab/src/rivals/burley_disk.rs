@@ -16,8 +16,8 @@ use subsurface::wgpu::{
 use subsurface::{Frame, Profile};
 
 use super::edge::{distances_mm, minimise, scattered_step, terms, vec3f};
-use super::packed::{PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN, over_skin};
-use super::pass::{Pass, Slot};
+use super::packed::{PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN};
+use super::pass::{Over, Pass, Slot};
 use crate::method::ScreenMethod;
 
 /// As in the shader.
@@ -78,7 +78,8 @@ impl BurleyDisk {
         let shader = [SCREEN, include_str!("burley_disk.wgsl"), &samples_wgsl(shape, samples)].concat();
         Self {
             packed: Packed::new(device, format),
-            disk: over_skin(
+            disk: Pass::over(
+                Over::Skin,
                 device,
                 "rivals burley_disk",
                 (&shader, "fs_disk"),

@@ -13,8 +13,8 @@ use subsurface::wgpu::{
 };
 
 use super::copy::Copy;
-use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN, over_skin};
-use super::pass::{CLEAR, Pass, Slot, scratch, size};
+use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN};
+use super::pass::{CLEAR, Over, Pass, Slot, scratch, size};
 use crate::method::ScreenMethod;
 use crate::passes::linear_sampler;
 
@@ -86,7 +86,8 @@ impl Jimenez2009 {
             let sigma_mm = (variance_mm2 - before_mm2).sqrt();
             before_mm2 = variance_mm2;
             let pass = |entry_point, targets: &[ColorTargetState]| {
-                over_skin(
+                Pass::over(
+                    Over::Skin,
                     device,
                     &format!("rivals jimenez_2009 {entry_point}"),
                     (&shader, entry_point),

@@ -5,8 +5,7 @@ use glam::Vec4;
 use subsurface::Frame;
 use subsurface::wgpu::util::DeviceExt;
 use subsurface::wgpu::{
-    self, BindGroup, Buffer, Color, ColorTargetState, CommandEncoder, Device, LoadOp, TextureFormat,
-    TextureView,
+    self, BindGroup, Buffer, Color, CommandEncoder, Device, LoadOp, TextureFormat, TextureView,
 };
 
 use super::pass::{self, CLEAR, Over, Pass, STENCIL, Slot, TRIANGLE, scratch, size};
@@ -31,12 +30,8 @@ pub struct Packed {
     /// Light as it was, where there is no skin.
     rest: Pass,
     scratch: Option<[TextureView; 3]>,
-    prepared: Option<Prepared>,
-}
-
-struct Prepared {
-    pack: BindGroup,
-    rest: BindGroup,
+    /// Of both passes.
+    prepared: Option<[BindGroup; 2]>,
 }
 
 /// What [`Packed::prepare`] leaves for the passes behind it.
@@ -44,18 +39,6 @@ pub struct Inputs {
     pub frame: Buffer,
     pub color: TextureView,
     pub surface: TextureView,
-}
-
-/// A pass over skin.
-pub fn over_skin(
-    device: &Device,
-    label: &str,
-    shader: (&str, &str),
-    slots: &[Slot],
-    targets: &[ColorTargetState],
-    constants: &[(&str, f64)],
-) -> Pass {
-    Pass::over(Over::Skin, device, label, shader, slots, targets, constants)
 }
 
 impl Packed {
@@ -102,8 +85,8 @@ impl Packed {
             [COLOR, SURFACE, STENCIL],
         );
         let texture = wgpu::BindingResource::TextureView;
-        self.prepared = Some(Prepared {
-            pack: self.pass.bind(
+        self.prepared = Some([
+            self.pass.bind(
                 device,
                 &[
                     uniform.as_entire_binding(),
@@ -112,16 +95,16 @@ impl Packed {
                     texture(profile_id),
                 ],
             ),
-            rest: self.rest.bind(device, &[texture(frame.irradiance)]),
-        });
+            self.rest.bind(device, &[texture(frame.irradiance)]),
+        ]);
         let [color, surface, _] = self.scratch.insert(views).clone();
         Ok(Inputs { frame: uniform, color, surface })
     }
 
     pub fn render(&self, encoder: &mut CommandEncoder) {
-        if let (Some(prepared), Some([color, surface, stencil])) = (&self.prepared, &self.scratch) {
+        if let (Some([pack, _]), Some([color, surface, stencil])) = (&self.prepared, &self.scratch) {
             let targets = [(color, CLEAR), (surface, CLEAR)];
-            let draws = [(&self.pass, &prepared.pack)];
+            let draws = [(&self.pass, pack)];
             pass::draw(encoder, &draws, &targets, Some(stencil), Color::BLACK);
         }
     }
@@ -140,8 +123,8 @@ impl Packed {
 
     /// A method's last pass over skin, and the light as it was elsewhere.
     pub fn finish(&self, encoder: &mut CommandEncoder, pass: (&Pass, &BindGroup), output: &TextureView) {
-        if let (Some(prepared), Some([.., stencil])) = (&self.prepared, &self.scratch) {
-            let draws = [pass, (&self.rest, &prepared.rest)];
+        if let (Some([_, rest]), Some([.., stencil])) = (&self.prepared, &self.scratch) {
+            let draws = [pass, (&self.rest, rest)];
             pass::draw(encoder, &draws, &[(output, CLEAR)], Some(stencil), Color::BLACK);
         }
     }

@@ -14,8 +14,8 @@ use subsurface::wgpu::{
 use subsurface::{Frame, Profile};
 
 use super::edge::{Responses, minimise, step, terms, vec3f};
-use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN, over_skin};
-use super::pass::{CLEAR, Pass, Slot, scratch, size};
+use super::packed::{COLOR, PACKED_BYTES, PACKED_FETCHES, Packed, SCREEN};
+use super::pass::{CLEAR, Over, Pass, Slot, scratch, size};
 use crate::method::ScreenMethod;
 use crate::passes::linear_sampler;
 
@@ -191,7 +191,7 @@ impl Separable {
         let pass = |entry_point, target: TextureFormat| {
             let label = format!("rivals separable {entry_point}");
             let shader = (shader.as_str(), entry_point);
-            over_skin(device, &label, shader, &slots, &[target.into()], &[])
+            Pass::over(Over::Skin, device, &label, shader, &slots, &[target.into()], &[])
         };
         Self {
             packed: Packed::new(device, format),

@@ -11,7 +11,7 @@ use crate::stability::case::{Bound, Case, Figures};
 use crate::stability::inputs::{Texels, Uploaded};
 use crate::stability::lab::{Lab, methods, ours};
 use crate::stability::trial::merge;
-use crate::synthetic::{View, largest, sphere};
+use crate::synthetic::{View, apart, sphere};
 
 pub fn cases(quick: bool) -> Vec<Case> {
     vec![resized(quick), switched(quick), interleaved(), lost(), leaks(quick)]
@@ -27,12 +27,6 @@ fn ball(size: [u32; 2], gpu: &Gpu) -> Uploaded {
 
 /// Pixels of a frame, alpha included.
 type Pixels = Vec<[f32; 4]>;
-
-/// The largest difference between two frames; NaN where one is.
-fn apart(a: &Pixels, b: &Pixels) -> f64 {
-    let pairs = a.iter().flatten().zip(b.iter().flatten());
-    largest(pairs.map(|(a, b)| f64::from((a - b).abs())))
-}
 
 const SAME: Bound = Bound {
     passes: 0.0,

@@ -322,11 +322,8 @@ fn two_layers(quick: bool) -> Vec<Case> {
         trial(format!("{part} before black, two layers"), what, GRADIENT, make).pictured(false)
     };
     let half = if quick { 44 } else { 88 };
-    let planned = |at_most| {
-        let why =
-            "Of the steep pixels at a rim a coarse pixel keeps the less steep ones. Use the exact sum.";
-        known(PLAN, at_most, why)
-    };
+    let steep = "Of the steep pixels at a rim a coarse pixel keeps the less steep ones. Use the exact sum.";
+    let planned = |at_most| known(PLAN, at_most, steep);
     let guess = "Most of a rim's area lies in the outer pixels and follows from a guessed slope.";
     vec![
         front("the rim of an ear", 0.75, [32, 24]).known([planned(0.045), known(EXACT, 0.03, guess)]),

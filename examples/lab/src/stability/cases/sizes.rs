@@ -8,7 +8,7 @@ use crate::method::{Ours, scatter};
 use crate::renderer::{Camera, Gpu, Lighting, Renderer, Scene, View};
 use crate::stability::case::{Bound, Case, PLAN, known};
 use crate::stability::lab::Lab;
-use crate::synthetic::largest;
+use crate::synthetic::{apart, largest};
 
 /// The most that a plan may differ by from the exact sum, in units of white: at the worst crease of the
 /// head, the line of the lips, coarse pixels hold light from both sides.
@@ -79,9 +79,7 @@ impl Sweep {
             let truth = by(&exact)?;
             for plan in &plans {
                 let found = by(plan.as_ref().map_err(Clone::clone)?)?;
-                let pairs = found.iter().flatten().zip(truth.iter().flatten());
-                let difference = largest(pairs.map(|(a, b)| f64::from((a - b).abs())));
-                worst.push(difference);
+                worst.push(apart(&found, &truth));
             }
         }
         Ok(largest(worst))

@@ -27,6 +27,26 @@ pub fn cases(quick: bool) -> Vec<Case> {
     cases
 }
 
+const SEAMS: &str = "A flat square under a soft edge of light (σ of 0.5 mm), cut into two islands \
+    that lie apart in the atlas, along the edge or at 27 degrees to it; 0.19 mm a texel \
+    (0.12 in full). In all cases of the square the figure is the largest difference in its \
+    middle 11x5.6 mm: in screen space, at 5 px/mm (8 in full), to the visible integral; in \
+    texture space, fetched bilinearly, to the closed form.";
+const STRETCH: &str = "One island, texels of 0.4 by 0.2 mm, or 0.4 by 0.05; the edge at 45 degrees \
+    with a σ of 1 mm.";
+const SHEAR: &str = "Texels whose sides are at 30 degrees to each other, the edge at 27 degrees.";
+const BEHIND: &str = "The square lies mirrored in the atlas, next to an island of another, 100 mm \
+    behind it and lit where this one is dark.";
+const DRAWN_OVER: &str = "Half of that other square is drawn onto the texels of this one, which \
+    `Atlas` asks a host not to do.";
+const WIDE_TEXELS: &str = "The edge at 27 degrees, with texels twice as wide as it is soft.";
+const STRIP: &str = "The atlas holds a strip across the edge, 2 mm wide; texture space is asked for \
+    that alone.";
+const ONE_POINT: &str = "A texel has room for one point. Give each surface an atlas of its own, or use \
+    the exact sum.";
+const COARSE: &str = "Light that is finer than the texels is not in the atlas. Take 2 texels for the \
+    narrowest edge of light, or use the exact sum.";
+
 /// What a flat square shows of an atlas; the camera sees the same of it every time.
 fn squares(quick: bool) -> Vec<Case> {
     let texel_mm = if quick { 0.19 } else { 0.12 };
@@ -65,38 +85,19 @@ fn squares(quick: bool) -> Vec<Case> {
         Case::new(name, what, GRADIENT, move |lab| square.run(lab, &layout, relative_rms))
     };
     let seam = |at_most| [known(ATLAS, at_most, SEAM)];
-    let seams = "A flat square under a soft edge of light (σ of 0.5 mm), cut into two islands \
-        that lie apart in the atlas, along the edge or at 27 degrees to it; 0.19 mm a texel \
-        (0.12 in full). In all cases of the square the figure is the largest difference in its \
-        middle 11x5.6 mm: in screen space, at 5 px/mm (8 in full), to the visible integral; in \
-        texture space, fetched bilinearly, to the closed form.";
-    let stretch = "One island, texels of 0.4 by 0.2 mm, or 0.4 by 0.05; the edge at 45 degrees \
-        with a σ of 1 mm.";
-    let shear = "Texels whose sides are at 30 degrees to each other, the edge at 27 degrees.";
-    let behind = "The square lies mirrored in the atlas, next to an island of another, 100 mm \
-        behind it and lit where this one is dark.";
-    let drawn_over = "Half of that other square is drawn onto the texels of this one, which \
-        `Atlas` asks a host not to do.";
-    let wide_texels = "The edge at 27 degrees, with texels twice as wide as it is soft.";
-    let narrow = "The atlas holds a strip across the edge, 2 mm wide; texture space is asked for \
-        that alone.";
-    let overlap = "A texel has room for one point. Give each surface an atlas of its own, or use \
-        the exact sum.";
-    let coarse = "Light that is finer than the texels is not in the atlas. Take 2 texels for the \
-        narrowest edge of light, or use the exact sum.";
     let strip = Layout::apart(1, vec![Island::new(strip, fine)]);
     vec![
-        case("a seam along an edge of light", seams, &upright, halves()).known(seam(0.26)),
-        case("a seam across an edge of light", seams, &diagonal, halves()).known(seam(0.22)),
-        case("stretch 1:2", stretch, &wide, whole(0.4 * DVec2::X, 0.2 * DVec2::Y)),
-        case("stretch 1:8", stretch, &wide, whole(0.4 * DVec2::X, 0.05 * DVec2::Y)),
-        case("shear by 60 degrees", shear, &diagonal, whole(u, sheared)),
-        case("a mirrored island", behind, &diagonal, Layout::apart(2, mirrored)).pictured(false),
-        case("islands that overlap", drawn_over, &diagonal, whole(u, v).drawn_over(right_half))
-            .known([by_nature(ATLAS, 1.05, overlap)]),
-        case("one texel a mm", wide_texels, &diagonal, whole(DVec2::X, DVec2::Y))
-            .known([by_nature(ATLAS, 0.1, coarse)]),
-        case("twenty texels a mm", narrow, &upright, strip).pictured(false),
+        case("a seam along an edge of light", SEAMS, &upright, halves()).known(seam(0.26)),
+        case("a seam across an edge of light", SEAMS, &diagonal, halves()).known(seam(0.22)),
+        case("stretch 1:2", STRETCH, &wide, whole(0.4 * DVec2::X, 0.2 * DVec2::Y)),
+        case("stretch 1:8", STRETCH, &wide, whole(0.4 * DVec2::X, 0.05 * DVec2::Y)),
+        case("shear by 60 degrees", SHEAR, &diagonal, whole(u, sheared)),
+        case("a mirrored island", BEHIND, &diagonal, Layout::apart(2, mirrored)).pictured(false),
+        case("islands that overlap", DRAWN_OVER, &diagonal, whole(u, v).drawn_over(right_half))
+            .known([by_nature(ATLAS, 1.05, ONE_POINT)]),
+        case("one texel a mm", WIDE_TEXELS, &diagonal, whole(DVec2::X, DVec2::Y))
+            .known([by_nature(ATLAS, 0.1, COARSE)]),
+        case("twenty texels a mm", STRIP, &upright, strip).pictured(false),
         rms("one island", whole(u, v)).pictured(false),
         rms("a hundred islands", hundred).known(seam(0.06)),
     ]
