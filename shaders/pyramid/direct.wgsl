@@ -39,6 +39,10 @@ const LEAST_WEIGHT = 0.004;
 
 // Weights are max(1 − r²/8v, 0)², whose variance is v: near to a Gaussian, and 0 beyond √8 σ.
 const CUT = 8.0;
+// Taps go this part of the way, which are two thirds of them and have 95 % of the weight. What makes up for the
+// rest on levels, whose Gaussians are many pixels wide, was found on heads. Pixels that are not square have all.
+const TAPS = 0.8;
+const WIDER = 1.02;
 
 // Across a gap t weights that end fade otherwise than e^(−t²/2v). Where a layer is near both have Gaussians that
 // are cut off where the others end, exp(−3.59 r²/8v) of variance v; what e^(−t²/2v) fades more by is told apart.
@@ -153,10 +157,12 @@ fn together(step: Step, scale: Scale) -> Together {
 // them, of whose variance the level has `own` px² already. Weights end where the distance off the plane is
 // 1/√`in_space`.
 fn summed(l: u32, center: vec2f, shape: Shape, plane: Plane, variance_mm2: f32, in_space: f32, own: f32) -> vec4f {
-    let k = on_plane(variance_mm2, plane.m, own);
+    let has_all = has_odd_pixels();
+    let k = on_plane(variance_mm2 * select(WIDER, 1.0, has_all || l == 0u), plane.m, own);
     // The ball, as it is seen.
     let mm = vec2f(plane.dx.x - plane.ray.x * plane.dx.z, plane.dy.y - plane.ray.y * plane.dy.z);
-    let reach = min(sqrt(CUT * max(variance_mm2 / (mm * mm) - own, vec2f(0.15))), vec2f(REACH));
+    let end = sqrt(CUT * max(variance_mm2 / (mm * mm) - own, vec2f(0.15)));
+    let reach = min(select(TAPS, 1.0, has_all) * end, vec2f(REACH));
     let first = max(ceil(center - reach), vec2f(0.0));
     let last = min(floor(center + reach), vec2f(textureDimensions(shapes, l)) - 1.0);
     let r = vec3f(plane.ray, 1.0);

@@ -16,6 +16,23 @@ fn fs_downsample(@builtin(position) at: vec4f) -> Surface {
     return of_all(pixel);
 }
 
+// The mean of those of two pixels that are skin.
+struct OnPlane {
+    id: u32,
+    z: f32,
+    sines: vec2f,
+}
+
+fn of_two(pixel: vec2i, first: vec2i, second: vec2i) -> OnPlane {
+    let a = textureLoad(finer_shape, 2 * pixel + first, 0).rg;
+    let b = textureLoad(finer_shape, 2 * pixel + second, 0).rg;
+    // Their shares.
+    let is_skin = vec2f(f32(a.x >> 24u != 0u), f32(b.x >> 24u != 0u));
+    let w = is_skin / max(is_skin.x + is_skin.y, 1.0);
+    let z = w.x * bitcast<f32>(a.y) + w.y * bitcast<f32>(b.y);
+    return OnPlane(max(a.x >> 24u, b.x >> 24u), z, w.x * sines_of(a) + w.y * sines_of(b));
+}
+
 // All of the pixels are of one surface.
 fn of_all(pixel: vec2i) -> Surface {
     // Between two pixels, three quarters on the way to the inner one.
@@ -26,22 +43,15 @@ fn of_all(pixel: vec2i) -> Surface {
         + textureSampleLevel(finer_light, linear, middle + vec2f(off.x, -off.y), 0.0)
         + textureSampleLevel(finer_light, linear, middle + vec2f(-off.x, off.y), 0.0)
         + textureSampleLevel(finer_light, linear, middle + off, 0.0);
-    var z = 0.0;
-    var sines = vec2f(0.0);
-    var count = 0.0;
-    var id = 0u;
-    for (var i = 0; i < 4; i++) {
-        let there = textureLoad(finer_shape, 2 * pixel + vec2i(i & 1, i >> 1u), 0).rg;
-        let is_skin = f32(there.x >> 24u != 0u);
-        z += is_skin * bitcast<f32>(there.y);
-        sines += is_skin * sines_of(there);
-        count += is_skin;
-        id = max(id, there.x >> 24u);
+    // The plane through two that are opposite, where these are skin, is that through all four.
+    var on_plane = of_two(pixel, vec2i(0), vec2i(1));
+    if on_plane.id == 0u {
+        on_plane = of_two(pixel, vec2i(1, 0), vec2i(0, 1));
     }
-    if count == 0.0 {
+    if on_plane.id == 0u {
         return Surface(vec4f(0.0), vec2u(0u));
     }
-    return Surface(half_floats(0.25 * light), packed(id, z / count, sines / count));
+    return Surface(half_floats(0.25 * light), packed(on_plane.id, on_plane.z, on_plane.sines));
 }
 
 // The surface is that of the nearest of the four pixels that this one covers; of the farthest where `side` is −1.

@@ -57,15 +57,6 @@ fn contents_in_reach(l: u32, tile: vec2i) -> Contents {
     return held;
 }
 
-// Whether pixels are so far from square that blurs of few taps do not fit them, and not so far that steps of
-// two pixels do.
-fn has_odd_pixels() -> bool {
-    // Of a perspective camera the latter are 0, of an orthographic one the former.
-    let px = abs(view.step.xy) + abs(view.step.zw);
-    let ratio = max(px.x, px.y) / min(px.x, px.y);
-    return ratio > 1.1 && ratio < 1.7;
-}
-
 // How far blurs that take the surface for planar may be off, in tiles that hold so much together: how bent
 // the surface is, up to 2, times the range of light.
 fn doubt(held: Contents, l: u32) -> f32 {

@@ -2,6 +2,7 @@
 // and in which tiles it is. A workgroup is a tile. Follows pack.wgsl, whose textures here are of the back.
 
 @group(0) @binding(11) var seen_shape: texture_2d<u32>;
+@group(0) @binding(13) var seen_light: texture_2d<f32>;
 // Of the tiles of each level, as they are in `grids`.
 @group(0) @binding(12) var<storage, read_write> back_tiles: array<atomic<u32>>;
 
@@ -11,13 +12,25 @@ const BACK_ANY = 2u;
 
 var<workgroup> held: atomic<u32>;
 
+// Whether light of a layer so far behind, in mm, changes what is seen by an error: Σ w e^(−t²/2v) times what they
+// differ by is more than that.
+fn scatters(thickness: f32, seen: vec4f, back: vec4f) -> bool {
+    let off = abs(seen.rgb / max(seen.a, 1e-6) - back.rgb / max(back.a, 1e-6));
+    let difference = max(max(off.r, off.g), max(off.b, 1e-6));
+    let reach2 = view.back_reach * view.back_reach + view.back_growth * log(difference);
+    return thickness < 0.0 || thickness * thickness < reach2;
+}
+
 @compute @workgroup_size(TILE, TILE)
 fn pack_back(
     @builtin(global_invocation_id) at: vec3u,
     @builtin(workgroup_id) tile: vec3u,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    if all(at.xy < view.size) {
+    // Where no skin is seen nothing is behind it.
+    let place = 3u * (tile.y * grids[0].x + tile.x);
+    let is_seen = (atomicLoad(&contents[place]) & PROFILES) != 0u;
+    if is_seen && all(at.xy < view.size) {
         let pixel = vec2i(at.xy);
         let seen = textureLoad(seen_shape, pixel, 0).rg;
         let here = host_surface(pixel);
@@ -28,7 +41,8 @@ fn pack_back(
             let packed = packed_at(pixel, here);
             textureStore(packed_light, pixel, packed.light);
             textureStore(packed_shape, pixel, vec4u(packed.shape, 0u, 0u));
-            let is_near = thickness < view.back_reach && packed.shape.x >> 24u == seen.x >> 24u;
+            let is_near = packed.shape.x >> 24u == seen.x >> 24u
+                && scatters(thickness, textureLoad(seen_light, pixel, 0), packed.light);
             atomicOr(&held, select(BACK_ANY, BACK_ANY | BACK_NEAR, is_near));
         }
     }

@@ -29,8 +29,10 @@ struct View {
     level_limit: f32,
     // Levels above the frame.
     levels: u32,
-    // How far behind the frame, in mm, a layer may lie to scatter to it; 0 where there is none.
+    // How far behind the frame, in mm, a layer may lie to scatter to it where its light is 1 apart; 0 where there is
+    // none. And how much the square of that grows for each factor of e that they are further apart.
     back_reach: f32,
+    back_growth: f32,
 }
 
 // A Gaussian, cut off by a shape of taps.
@@ -176,6 +178,15 @@ fn ray(pixel: vec2i) -> vec4f {
 // The mm between pixels of this level on a surface that faces the camera.
 fn mm_per_px(z: f32) -> vec2f {
     return abs(view.step.xy * z + view.step.zw) * level.scale;
+}
+
+// Whether pixels are so far from square that blurs of few taps do not fit them, and not so far that steps of
+// two pixels do.
+fn has_odd_pixels() -> bool {
+    // Of a perspective camera the latter are 0, of an orthographic one the former.
+    let px = abs(view.step.xy) + abs(view.step.zw);
+    let ratio = max(px.x, px.y) / min(px.x, px.y);
+    return ratio > 1.1 && ratio < 1.7;
 }
 
 // The plane through the surface at a pixel, in steps of a pixel.

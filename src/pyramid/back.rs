@@ -9,9 +9,18 @@ use super::scratch::{self, Scratch, View};
 use crate::Profile;
 use crate::gpu::{self, Recorder};
 
-/// How far behind a surface a layer may lie, in mm, for its light to change what is seen by an error, each as a part
-/// of white: Σ w e^(−t²/2v) at t.
-pub(super) fn reach_mm(profiles: &[Profile], error: f32) -> f32 {
+/// How far behind a surface a layer may lie, in mm, for its light to change what is seen by an error, where that is 1
+/// apart; and how much the square of that grows for each factor of e that it is further apart.
+pub(super) fn reach(profiles: &[Profile], error: f32) -> [f32; 2] {
+    let [far, near] = [error, LESS * error].map(|error| reach_mm(profiles, error));
+    [far, (far * far - near * near) / LESS.ln()]
+}
+
+/// Between light that is 1 apart and this much less the square of the reach is taken for a line.
+const LESS: f32 = 10.0;
+
+/// At which distance Σ w e^(−t²/2v) is down to an error.
+fn reach_mm(profiles: &[Profile], error: f32) -> f32 {
     let is_seen = |t: f32| {
         let left = |profile: &Profile| {
             let each = profile.gaussians().iter().filter(|g| g.variance_mm2 > 0.0);
@@ -122,8 +131,10 @@ impl Back {
                 (7, Texture(light)),
                 (8, Texture(shape)),
                 (9, front.grids.as_entire_binding()),
+                (10, front.contents.as_entire_binding()),
                 (11, Texture(&front.levels[0].shape)),
                 (12, self.tiles.as_entire_binding()),
+                (13, Texture(&front.levels[0].light)),
             ],
         );
         let pairs = self.levels.iter().zip(&self.levels[1..]).zip(&front.levels[1..]);

@@ -20,11 +20,12 @@ pub(crate) use passes::OVERLAY;
 use passes::{LIGHT, OverTiles, Passes};
 use scratch::{CLASSES, DRAW_BYTES, Scratch};
 
-/// What doubt (`list_tiles.wgsl`) there may be in a tile of the frame for it to be planar, over the error of the
-/// plan and at most in all, and in one of a level. Found on heads: beyond, errors grow.
+/// What doubt (`list_tiles.wgsl`) there may be in a tile for it to be planar, over the error of the plan and at
+/// most in all: of the frame, and of its levels. Found on heads: beyond, errors grow.
 const FRAME_LIMIT_ERRORS: f32 = 98.0;
-const FRAME_LIMIT: f32 = 0.52;
-const LEVEL_LIMIT: f32 = 0.7;
+const FRAME_LIMIT: f32 = 0.7;
+const LEVEL_LIMIT_ERRORS: f32 = 184.0;
+const LEVEL_LIMIT: f32 = 1.0;
 
 /// The passes of a plan, and its weights.
 #[derive(Debug)]
@@ -180,6 +181,8 @@ impl Pyramid {
         let nearest_mm = frame.nearest.map(|nearest| nearest * frame.mm_per_unit);
         let coarsest = plan.coarsest_level(optics.nearest_px_per_mm(nearest_mm));
         let last = coarsest.max(1).min(view.scratch.levels.len() - 1);
+        let [back_reach, back_growth] =
+            frame.back.map_or([0.0; 2], |_| back::reach(profiles, plan.predicted_error()));
         let numbers = scratch::View {
             has_id: u32::from(frame.profile_id.is_some()),
             has_strength: u32::from(frame.strength.is_some()),
@@ -195,9 +198,11 @@ impl Pyramid {
             first_pixel: frame.rectangle().first(),
             size: size.into(),
             frame_limit: FRAME_LIMIT.min(FRAME_LIMIT_ERRORS * plan.predicted_error()),
-            level_limit: LEVEL_LIMIT,
+            level_limit: LEVEL_LIMIT.min(LEVEL_LIMIT_ERRORS * plan.predicted_error()),
             levels: last as u32,
-            back_reach: frame.back.map_or(0.0, |_| back::reach_mm(profiles, plan.predicted_error())),
+            back_reach,
+            back_growth,
+            pad: [0; 3],
         };
         queue.write_buffer(&view.scratch.view, 0, bytemuck::bytes_of(&numbers));
         let back_id = frame.back.and_then(|back| back.profile_id).or(frame.profile_id);

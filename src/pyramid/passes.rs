@@ -180,8 +180,10 @@ impl Passes {
                     (7, gpu::stored(LIGHT)),
                     (8, gpu::stored(SHAPE)),
                     (9, UNIFORM),
+                    (10, WRITE),
                     (11, UINTS),
                     (12, WRITE),
+                    (13, FLOATS),
                 ],
             ),
             halve_back: compute(

@@ -32,6 +32,8 @@ pub(super) struct View {
     pub level_limit: f32,
     pub levels: u32,
     pub back_reach: f32,
+    pub back_growth: f32,
+    pub pad: [u32; 3],
 }
 
 /// `Blur` of surface.wgsl.
@@ -369,7 +371,8 @@ mod tests {
                 frame_limit,
                 level_limit,
                 levels,
-                back_reach
+                back_reach,
+                back_growth
             }
         );
         assert_layout!(&PLANAR.concat(), "Blur", Blur { variance, own, limit, narrow, sharpness, slot });

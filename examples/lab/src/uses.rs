@@ -159,9 +159,10 @@ impl<'a> Seen<'a> {
         uses.add(method, "pack", on, off / LEAVES_AT_ONCE, "guess", "");
         let threads = |l: usize| counted.levels[l][0] * counted.levels[l][1] * TILE * TILE;
         for (l, tiles) in counted.back.iter().enumerate() {
-            let pass = if l == 0 { "pack back" } else { "halve back" };
-            let on = tiles.iter().filter(|holds| **holds != 0).count() as u32 * TILE * TILE;
-            uses.add(method, pass, on, threads(l) - on, "", "");
+            let on_back = tiles.iter().filter(|holds| **holds != 0).count() as u32 * TILE * TILE;
+            // Tiles without skin are left at once.
+            let (pass, threads) = if l == 0 { ("pack back", on) } else { ("halve back", threads(l)) };
+            uses.add(method, pass, on_back, threads - on_back, "", "");
         }
         let tiles: u32 = counted.levels.iter().map(|[x, y]| x * y).sum();
         let listed: u32 = counted.tiles.iter().flatten().sum();
@@ -292,7 +293,7 @@ impl<'a> Seen<'a> {
             let own = ways * (1.0 - 1.0 / (side * side));
             let mm = facing_mm * side;
             let variance_px2 = variance * mm2 * side * side / (mm * mm) - own;
-            let reach = (CUT * variance_px2.max(0.15)).sqrt().min(REACH);
+            let reach = (TAPS * (CUT * variance_px2.max(0.15)).sqrt()).min(REACH);
             let center = at / side - 0.5;
             let last = (DVec2::new(SIZE[0].into(), SIZE[1].into()) / side).floor() - 1.0;
             let (first, end) =
@@ -338,6 +339,7 @@ const ROWS_ONCE: f64 = 2.0 / 3.0;
 /// As in shaders/pyramid/direct.wgsl, and `WIDE_PX2` in src/pyramid/scratch.rs.
 const REACH: f64 = 6.0;
 const CUT: f64 = 8.0;
+const TAPS: f64 = 0.8;
 const LEAST_WEIGHT: f64 = 0.004;
 const WIDE_PX2: f64 = 1.0;
 
