@@ -52,7 +52,7 @@ fn layers(quick: bool) -> Vec<Case> {
     };
     let known = |plan, atlas| [known(PLAN, plan, COARSE), known(ATLAS, atlas, ISLANDS)];
     vec![
-        case(1.0).known(known(0.03, 0.35)),
+        case(1.0).known(known(0.034, 0.35)),
         case(2.0).known(known(0.042, 0.22)).pictured(false),
         case(5.0).known(known(0.0125, 0.025)),
         case(10.0).pictured(false),
@@ -275,7 +275,7 @@ pub fn behind(quick: bool) -> Vec<Case> {
         slab(4.0).pictured(false),
         rim.known(unseen([0.17; 2])),
         finger(90.0),
-        finger(130.0).known(unseen([0.018, 0.0113])),
+        finger(130.0).known(unseen([0.018, 0.0125])),
         head(90.0),
         head(130.0).known(unseen([0.015, 0.014])),
     ];

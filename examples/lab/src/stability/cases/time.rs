@@ -161,7 +161,7 @@ fn past_a_layer(quick: bool) -> Case {
         }
         Ok(track.outcome(Track::swing, 0..COLUMNS))
     })
-    .known([known(PLAN, if quick { 0.0142 } else { 0.024 }, CLASSES_CHANGE)])
+    .known([known(PLAN, if quick { 0.0155 } else { 0.024 }, CLASSES_CHANGE)])
 }
 
 /// An edge along a column, and a camera that pans along it by whole pixels.
