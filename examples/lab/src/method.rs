@@ -56,18 +56,21 @@ pub fn scatter_atlas(
 pub struct Ours {
     pub effect: ScreenSpace,
     pub view: View,
+    /// Whether the frame that was last prepared has a layer behind.
+    has_back: bool,
 }
 
 impl Ours {
     /// # Errors
     /// A format or a device that the effect refuses.
     pub fn new(device: &Device, output: TextureFormat, plan: &Plan) -> Result<Self, Error> {
-        Ok(Self { effect: ScreenSpace::new(device, output, plan)?, view: View::new() })
+        Ok(Self { effect: ScreenSpace::new(device, output, plan)?, view: View::new(), has_back: false })
     }
 }
 
 impl ScreenMethod for Ours {
     fn prepare(&mut self, device: &Device, queue: &Queue, frame: &Frame) -> Result<(), Error> {
+        self.has_back = frame.back.is_some();
         Ok(self.view.prepare(device, queue, &self.effect, frame)?)
     }
 
@@ -77,6 +80,9 @@ impl ScreenMethod for Ours {
 
     fn fetches(&self, px_per_mm: f64) -> Option<f64> {
         let plan = self.effect.plan();
+        if self.has_back {
+            return None;
+        }
         match plan.is_exact() {
             true => Some(exact_fetches(px_per_mm)),
             // Of a pixel on a simple tile; the others read where each tap lies, too.
@@ -85,7 +91,9 @@ impl ScreenMethod for Ours {
     }
 
     fn scratch_bytes_per_pixel(&self) -> f64 {
-        self.effect.scratch_bytes([1920, 1080]) as f64 / (1920.0 * 1080.0)
+        let size = [1920, 1080];
+        let back = if self.has_back { self.effect.back_scratch_bytes(size) } else { 0 };
+        (self.effect.scratch_bytes(size) + back) as f64 / (1920.0 * 1080.0)
     }
 }
 

@@ -409,7 +409,7 @@ impl Set {
         let projection = with.look.camera.projection(self.size);
         let mut frame = self.renderer.gbuffer.frame(projection, with.stage.mm_per_unit);
         frame.back = self.back.as_ref().filter(|_| with.look.has_back).map(BackRenderer::layer);
-        let Ours { effect, view } = ours;
+        let Ours { effect, view, .. } = ours;
         view.prepare(&gpu.device, &gpu.queue, effect, &frame)?;
         let times = with.effects.timestamps.as_ref().zip(passes);
         passes::run(gpu, times, |encoder, queries| match queries {
