@@ -12,8 +12,8 @@ against the other.
 
 Usage: cargo run --release --example chart -- [OPTIONS]
 
-  --scenes LIST     of front, three-quarter, close-up, far, profile, wide, sphere, edge_0.5 to
-                    edge_64, turning, costs and heads, separated by
+  --scenes LIST     of front, three-quarter, close-up, far, profile, ear, wide, sphere,
+                    edge_0.5 to edge_64, turning, costs and heads, separated by
                     commas                                              [all]
   --methods LIST    such as screen_exact,burley_disk                    [all]
   --size WxH        of the frames, in pixels, but for wide, a third of   [512x512; quick: 256x256]

@@ -40,7 +40,7 @@ pub struct Row {
     /// Mean FLIP over skin.
     pub flip_mean: Option<f64>,
     /// Energy, area-weighted, over that of the truth that colours are compared with: the visible
-    /// integral, or for texture space the surface integral, normalised.
+    /// integral, or for texture space and with the layer behind the surface integral, normalised.
     pub energy_ratio: Option<f64>,
     /// Textures of its own, in bytes a pixel of the frame.
     pub scratch_bytes_per_pixel: Option<f64>,

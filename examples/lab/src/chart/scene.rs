@@ -4,9 +4,11 @@ use crate::Error;
 use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec3};
 use half::f16;
 use subsurface::wgpu::{TextureFormat, TextureView};
-use subsurface::{Frame, Profile};
+use subsurface::{BackLayer, Frame, Profile};
 
-use crate::renderer::{Camera, Gpu, Lighting, Primitive, Probe, Renderer, Scene as Model, View, Visible};
+use crate::renderer::{
+    BackRenderer, Camera, Gpu, Lighting, Primitive, Probe, Renderer, Scene as Model, View, Visible,
+};
 use crate::truth::{Patch, Pixel, closed_form, even_steps};
 
 /// σ of red light in the skin profile, in mm, by which the edges are named.
@@ -20,7 +22,7 @@ pub const SPARSE: u32 = 2;
 
 /// Names of the scenes, in the order in which they are run.
 pub fn names() -> Vec<String> {
-    let heads = ["front", "three-quarter", "close-up", "far", "profile", "wide", "sphere"];
+    let heads = ["front", "three-quarter", "close-up", "far", "profile", "ear", "wide", "sphere"];
     let edges = EDGES_PX.iter().map(|px| format!("edge_{px}"));
     heads.map(String::from).into_iter().chain(edges).collect()
 }
@@ -44,6 +46,8 @@ pub struct Scene {
     /// The truth is asked for at every so many pixels, each way.
     pub stride: u32,
     pub surface: Surface,
+    /// The surface right behind the visible one, where methods are tried with it.
+    back: Option<BackRenderer>,
 }
 
 /// What the surface integral is taken over.
@@ -86,6 +90,7 @@ impl Scene {
             "close-up" => view(View::CloseUp),
             "profile" => view(View::Profile),
             "far" => far(view(View::Front), size, mm_per_unit),
+            "ear" => view(View::Ear),
             "sphere" => return Ok(sphere(gpu, size, stride)),
             _ => {
                 let width = name.strip_prefix("edge_").and_then(|px| px.parse().ok());
@@ -95,11 +100,31 @@ impl Scene {
                 };
             }
         };
-        let scene = Self::head(gpu, model, mm_per_unit, name, size, camera)?;
+        let scene = match name {
+            "ear" => Self::from_behind(gpu, model, mm_per_unit, name, size, camera)?,
+            _ => Self::head(gpu, model, mm_per_unit, name, size, camera)?,
+        };
         Ok(Self { stride, ..scene })
     }
 
-    /// Any view of heads.
+    /// Lit from behind, with the layer behind what is seen.
+    fn from_behind(
+        gpu: &Gpu,
+        model: &Model,
+        mm_per_unit: f32,
+        name: &str,
+        size: [u32; 2],
+        camera: Camera,
+    ) -> Result<Self, Error> {
+        let renderer = Renderer::new(gpu, model, size)?;
+        renderer.render(gpu, &camera, &Lighting::behind(), mm_per_unit)?;
+        let back = BackRenderer::new(gpu, &renderer);
+        back.render(gpu, &renderer);
+        let scene = Self::drawn(gpu, renderer, mm_per_unit, name, size, camera)?;
+        Ok(Self { back: Some(back), ..scene })
+    }
+
+    /// Any view of heads, in a portrait's light.
     ///
     /// # Errors
     /// A size that the device cannot render; no skin in view.
@@ -113,6 +138,18 @@ impl Scene {
     ) -> Result<Self, Error> {
         let renderer = Renderer::new(gpu, model, size)?;
         renderer.render(gpu, &camera, &Lighting::default(), mm_per_unit)?;
+        Self::drawn(gpu, renderer, mm_per_unit, name, size, camera)
+    }
+
+    /// What a renderer last drew, for this camera.
+    fn drawn(
+        gpu: &Gpu,
+        renderer: Renderer,
+        mm_per_unit: f32,
+        name: &str,
+        size: [u32; 2],
+        camera: Camera,
+    ) -> Result<Self, Error> {
         let visible = Probe::new(gpu, &renderer).visible(gpu, &renderer);
         let g = &renderer.gbuffer;
         let skin: Vec<bool> = gpu.read_bytes(g.profile_id.texture()).iter().map(|id| *id == 1).collect();
@@ -149,10 +186,16 @@ impl Scene {
             albedo: gpu.read(&g.albedo).into_iter().map(rgb).collect(),
             stride: 1,
             surface: Surface::Head(Box::new(Head { renderer, camera })),
+            back: None,
         })
     }
 
-    /// As methods take it.
+    /// What lies right behind what is seen; where the scene is not lit through it, nothing.
+    pub fn back(&self) -> Option<BackLayer<'_>> {
+        self.back.as_ref().map(BackRenderer::layer)
+    }
+
+    /// As methods take it, without what is behind.
     pub fn frame(&self) -> Frame<'_> {
         let projection = self.projection.to_cols_array_2d();
         let mut frame = Frame::new(&self.irradiance, &self.depth, projection);
@@ -353,5 +396,6 @@ fn orthographic(
         pixels,
         stride,
         surface: Surface::Known(known),
+        back: None,
     }
 }

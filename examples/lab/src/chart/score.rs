@@ -27,6 +27,8 @@ pub struct Score<'a> {
 #[derive(Clone, Copy, PartialEq)]
 pub enum Knows {
     Frame,
+    /// The frame, and the layer behind.
+    Back,
     Mesh,
 }
 
@@ -62,7 +64,7 @@ impl<'a> Score<'a> {
     pub fn truth(&self, knows: Knows) -> &[Vec3] {
         match knows {
             Knows::Frame => &self.truths.visible,
-            Knows::Mesh => &self.truths.normalised,
+            Knows::Back | Knows::Mesh => &self.truths.normalised,
         }
     }
 

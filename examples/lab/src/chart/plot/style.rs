@@ -19,7 +19,7 @@ pub struct Style<'a> {
 }
 
 // Colours after Okabe & Ito and Tol, which the colour-blind can tell apart; shapes for print.
-const METHODS: [Style; 11] = [
+const METHODS: [Style; 14] = [
     style(NONE, "no scattering", "#777777", Marker::Plus),
     style(COPY, "copy", "#777777", Marker::Cross),
     style("screen_exact", "screen space, exact sum", "#222222", Marker::Diamond),
@@ -31,6 +31,9 @@ const METHODS: [Style; 11] = [
     style("jimenez_separable", "Jimenez separable", "#d55e00", Marker::Up),
     style("fitted_separable", "fitted separable", "#cc5fa0", Marker::Down),
     style("burley_disk", "Burley disk", "#6a3d9a", Marker::Cross),
+    style("jimenez_2010", "Jimenez 2010, transmission", "#d55e00", Marker::Star),
+    style("jimenez_2010_derived", "Jimenez 2010, derived", "#d55e00", Marker::Square),
+    style("burley_2015", "Burley 2015, transmission", "#6a3d9a", Marker::Star),
 ];
 
 // For methods that are not among those.
