@@ -69,7 +69,7 @@ pub struct Frame<'a> {
 ///
 /// Textures are of the frame's size and projection, and follow [`Frame::viewport`]. Only what lies near behind
 /// visible skin counts, elsewhere they may hold anything: within 3.5 σ of the widest Gaussian by the exact sum,
-/// 9.5 mm for skin; by a plan as far as its error can tell, 6.7 mm at 1/255.
+/// 9.5 mm for skin; by a plan as far as its error can tell, 6.7 mm at 1/255 where the light of both differs by 1.
 /// Each Gaussian is summed over both layers by distance in space and divided by its mass over both, so that even
 /// light stays even.
 #[derive(Clone, Copy, Debug)]
