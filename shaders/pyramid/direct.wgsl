@@ -44,23 +44,24 @@ const CUT = 8.0;
 const TAPS = 0.8;
 const WIDER = 1.02;
 
-// Across a gap t weights that end fade otherwise than e^(−t²/2v). Where a layer is near both have Gaussians that
-// are cut off where the others end, exp(−3.59 r²/8v) of variance v; what e^(−t²/2v) fades more by is told apart.
+// Across a gap t weights that end fade otherwise than e^(−t²/2v). Where a layer is near, both take Gaussians that
+// are cut off there, exp(−3.59 r²/8v) of variance v; what e^(−t²/2v) fades more by is `Row::across`.
 const CUT_GAUSSIAN = 3.59;
-// Gaussians whose σ is less than this part of what lies between the layers do not cross it.
+// A Gaussian does not cross a gap of more than this many of its σ.
 const CROSSING_SIGMAS = 3.5;
 
-// Weights of single pixels are wider than what they spread by: in square pixels.
+// The least variance, in square pixels, by which distance off the plane is judged: a single pixel spans more than
+// narrower weights spread.
 const NARROWEST_IN_SPACE = 0.25;
 
-// What of this variance in square pixels has the variance asked for on a lattice of pixels, where few weigh
+// The variance to ask for, in square pixels, so that weights of single pixels have `v`; of narrow ones few weigh
 // anything.
 fn widened_on_lattice(v: f32) -> f32 {
     return max(v, 0.13 + 0.37 * v);
 }
 
 // What weights of a variance lose on the plane: of x², xy and y² in pixels of the level. What the level was blurred
-// by on the way there is told off.
+// by on the way there is subtracted.
 fn on_plane(variance_mm2: f32, m: vec3f, own: f32) -> vec3f {
     let det = m.x * m.z - m.y * m.y;
     var c = variance_mm2 / max(det, 1e-30) * vec3f(m.z, -m.y, m.x) - own * vec3f(1.0, 0.0, 1.0);
@@ -82,14 +83,15 @@ struct Row {
     rest: f32,
     k01: f32,
     k00: f32,
-    // Of the plane, z below the pixel's own place and its step with each pixel.
+    // z of the plane in the column of the pixel itself, and its step with each pixel.
     z: f32,
     to_z: f32,
     // 2p·(ray, 1) there and its step, and (ray, 1)², over the square of the distance where weights end.
     on_ray: f32,
     to_ray: f32,
     ray2: f32,
-    // Whether there is a layer within reach, and what is left of a weight across it.
+    // Whether both layers take Gaussians: not where one of this profile lies too far behind. What is left of a
+    // weight across the gap: 0 where none of this profile is behind the nearest pixel.
     is_thin: bool,
     across: f32,
 }
@@ -178,6 +180,7 @@ fn summed(l: u32, center: vec2f, shape: Shape, plane: Plane, variance_mm2: f32, 
         let behind = textureLoad(back_shapes, nearest, l).rg;
         let gap = shape.z - bitcast<f32>(behind.y);
         let is_far = gap * gap > CROSSING_SIGMAS * CROSSING_SIGMAS * variance_mm2;
+        // Along the camera's axis: along the normal heads lit from behind come out worse.
         row.is_thin = behind.x >> 24u != shape.id || !is_far;
         // As far as the layers are apart along the normal.
         let apart2 = gap * gap / (1.0 + dot(shape.tangent, shape.tangent));

@@ -12,7 +12,7 @@ fn halve_back(@builtin(global_invocation_id) at: vec3u, @builtin(workgroup_id) t
     let grid = grids[firstLeadingBit(u32(level.scale))];
     var halved = Surface(vec4f(0.0), vec2u(0u));
     if back_tiles[grid.z + tile.y * grid.x + tile.x] != 0u {
-        // As of the frame the nearest: that which is turned least from the camera's axis.
+        // The farthest, as of the frame the nearest: of a closed shape the part that faces the axis most.
         halved = of_one_surface(vec2i(at.xy), -1.0);
     }
     textureStore(halved_light, at.xy, halved.light);

@@ -12,8 +12,8 @@ const BACK_ANY = 2u;
 
 var<workgroup> held: atomic<u32>;
 
-// Whether light of a layer so far behind, in mm, changes what is seen by an error: Σ w e^(−t²/2v) times what they
-// differ by is more than that.
+// Whether a layer so far behind, in mm, changes the light by more than the plan's error: Σ w e^(−t²/2v) times the
+// difference of their light exceeds it.
 fn scatters(thickness: f32, seen: vec4f, back: vec4f) -> bool {
     let off = abs(seen.rgb / max(seen.a, 1e-6) - back.rgb / max(back.a, 1e-6));
     let difference = max(max(off.r, off.g), max(off.b, 1e-6));
@@ -36,7 +36,7 @@ fn pack_back(
         let here = host_surface(pixel);
         let is_skin = here.id != 0u && here.id <= view.profiles;
         let thickness = bitcast<f32>(seen.y) - here.z;
-        // Twice as far as what scatters to this pixel may scatter to others.
+        // A back too far to reach this pixel may reach others: up to twice as far it is kept.
         if seen.x >> 24u != 0u && is_skin && thickness < 2.0 * view.back_reach {
             let packed = packed_at(pixel, here);
             textureStore(packed_light, pixel, packed.light);

@@ -29,8 +29,8 @@ struct View {
     level_limit: f32,
     // Levels above the frame.
     levels: u32,
-    // How far behind the frame, in mm, a layer may lie to scatter to it where its light is 1 apart; 0 where there is
-    // none. And how much the square of that grows for each factor of e that they are further apart.
+    // How far behind the frame, in mm, a layer may lie to scatter to it where their light differs by 1; 0 where there
+    // is none. And what is added to the square of that for each factor of e in the difference.
     back_reach: f32,
     back_growth: f32,
 }

@@ -9,14 +9,14 @@ use super::scratch::{self, Scratch, View};
 use crate::Profile;
 use crate::gpu::{self, Recorder};
 
-/// How far behind a surface a layer may lie, in mm, for its light to change what is seen by an error, where that is 1
-/// apart; and how much the square of that grows for each factor of e that it is further apart.
+/// `[r, g]`: a layer changes the light by more than `error`, a part of white, where the square of its distance behind
+/// the surface, in mm, is under r² + g·ln d, with d the difference of their light.
 pub(super) fn reach(profiles: &[Profile], error: f32) -> [f32; 2] {
     let [far, near] = [error, LESS * error].map(|error| reach_mm(profiles, error));
     [far, (far * far - near * near) / LESS.ln()]
 }
 
-/// Between light that is 1 apart and this much less the square of the reach is taken for a line.
+/// That line goes through d = 1 and d = 1 over this.
 const LESS: f32 = 10.0;
 
 /// At which distance Σ w e^(−t²/2v) is down to an error.

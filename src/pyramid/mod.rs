@@ -90,7 +90,8 @@ pub struct Tiles<'a> {
     /// Tiles, x in the low half of a word: of each level, the frame first, as many words as it has tiles, the
     /// planar ones from the front on, the others from the end. `COPY_SRC`.
     pub list: &'a Buffer,
-    /// A word a tile, levels in the same order: not 0 where there is a back layer within reach. `COPY_SRC`.
+    /// A word a tile, levels in the same order: bit 0 where a back layer is within reach, bit 1 where any
+    /// is packed. `COPY_SRC`.
     pub back: Option<&'a Buffer>,
     /// Columns and rows of tiles of each level that is drawn.
     pub levels: Vec<[u32; 2]>,

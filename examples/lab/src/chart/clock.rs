@@ -259,12 +259,12 @@ mod tests {
             mapped_at_creation: false,
         }));
         for timestamps in [None, Timestamps::new(&gpu, 2)] {
-            let clock = Clock { timestamps, long_enough_ms: 5.0 };
+            let clock = Clock { timestamps, long_enough_ms: 50.0 };
             let repeats = clock.repeats(&gpu, &clear, &output).unwrap();
             let ms = clock.ms(&gpu, &clear, &output, repeats).unwrap();
             println!("{}: {repeats} times {ms} ms", clock.name());
             // A megabyte is cleared in well under that, by a busy machine, too.
-            assert!(repeats > 1 && ms > 0.0 && ms < 5.0, "{repeats}, {ms}");
+            assert!(repeats > 1 && ms > 0.0 && ms < 50.0, "{repeats}, {ms}");
         }
     }
 
