@@ -45,7 +45,7 @@ impl ScreenSpace {
         let output = output.into();
         validate::output(device, output)?;
         let passes = match plan.weights() {
-            Some(weights) => Passes::Pyramid(Pyramid::new(device, output, weights)?),
+            Some(weights) => Passes::Pyramid(Pyramid::new(device, output, weights, plan.profiles())?),
             None => Passes::Exact(Exact::new(device, output)),
         };
         Ok(Self { shared: Arc::new(Shared { output, plan: plan.clone(), passes }) })
@@ -131,8 +131,7 @@ impl View {
         match passes {
             Passes::Pyramid(pyramid) => {
                 Optics::check_depth_alone(frame)?;
-                let profiles = plan.profiles();
-                pyramid.prepare(device, queue, &mut self.pyramid, frame, &optics, profiles);
+                pyramid.prepare(device, queue, &mut self.pyramid, frame, &optics);
             }
             Passes::Exact(exact) => {
                 let profiles = plan.profiles();

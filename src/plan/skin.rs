@@ -1,8 +1,5 @@
-//! Weights of skin, as they were fitted. Written by
-//!
-//! ```text
-//! cargo test --release --lib write_skin -- --ignored
-//! ```
+//! Weights of skin, as they were fitted. Written by `stored_plans_are_what_is_fitted` of stored.rs, which
+//! says where, when they differ.
 
 use super::stored::Stored;
 

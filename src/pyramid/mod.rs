@@ -32,6 +32,8 @@ const LEVEL_LIMIT: f32 = 1.0;
 pub(crate) struct Pyramid {
     output: Output,
     plan: Weights,
+    /// Of a back layer: `back::reach`.
+    back_reach: [f32; 2],
     weights: Buffer,
     passes: Passes,
     linear: Sampler,
@@ -112,7 +114,12 @@ struct Textures {
 impl Pyramid {
     /// # Errors
     /// A device that allows less than WebGPU's default limits.
-    pub(crate) fn new(device: &Device, output: Output, plan: &Weights) -> Result<Self, Error> {
+    pub(crate) fn new(
+        device: &Device,
+        output: Output,
+        plan: &Weights,
+        profiles: &[Profile],
+    ) -> Result<Self, Error> {
         let limits = device.limits();
         for (limit, got, needs) in [
             ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 4),
@@ -127,6 +134,7 @@ impl Pyramid {
         Ok(Self {
             output,
             plan: plan.clone(),
+            back_reach: back::reach(profiles, plan.predicted_error()),
             weights: gpu::filled_buffer(
                 device,
                 "subsurface::pyramid weights",
@@ -163,7 +171,6 @@ impl Pyramid {
         view: &mut Option<PyramidView>,
         frame: &Frame,
         optics: &Optics,
-        profiles: &[Profile],
     ) {
         let size = frame.rectangle().size();
         if view.as_ref().is_some_and(|v| v.scratch.size != size) {
@@ -182,8 +189,7 @@ impl Pyramid {
         let nearest_mm = frame.nearest.map(|nearest| nearest * frame.mm_per_unit);
         let coarsest = plan.coarsest_level(optics.nearest_px_per_mm(nearest_mm));
         let last = coarsest.max(1).min(view.scratch.levels.len() - 1);
-        let [back_reach, back_growth] =
-            frame.back.map_or([0.0; 2], |_| back::reach(profiles, plan.predicted_error()));
+        let [back_reach, back_growth] = frame.back.map_or([0.0; 2], |_| self.back_reach);
         let numbers = scratch::View {
             has_id: u32::from(frame.profile_id.is_some()),
             has_strength: u32::from(frame.strength.is_some()),
