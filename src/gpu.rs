@@ -188,6 +188,7 @@ pub(crate) fn compute_pipeline(
     module: &ShaderModule,
     entry_point: &str,
     layout: &BindGroupLayout,
+    constants: &[(&str, f64)],
 ) -> wgpu::ComputePipeline {
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
         label: Some(label),
@@ -199,7 +200,7 @@ pub(crate) fn compute_pipeline(
         layout: Some(&layout),
         module,
         entry_point: Some(entry_point),
-        compilation_options: Default::default(),
+        compilation_options: wgpu::PipelineCompilationOptions { constants, ..Default::default() },
         cache: None,
     })
 }

@@ -198,14 +198,15 @@ fn taps_of(plane: Plane, scale: Scale, lattice: Lattice) -> Taps {
 struct Gathered {
     light: vec3f,
     weight: vec3f,
-    // The mean of this level's blurs; or what the pixel has, where none is asked for.
+    // The mean of this level's blurs.
     own: vec3f,
 }
 
-// Weights lie between those of two rows, and on simple tiles between those of the corners. Where one fades
-// to nothing what is left of it is a rounding error, of either sign: about 1e-7 on this side of 1, and more
-// where a GPU interpolates in fixed point. Nothing may be divided by it.
-const NEGLIGIBLE_WEIGHT = 1e-4;
+// What a pixel's own light weighs on top of blurs, and what these weigh on top of coarser ones. Where weights fade to
+// nothing a rounding error is left of them, of either sign: about 1e-7 where they lie between those of corners, and
+// more where a GPU interpolates in fixed point. Nothing may be divided by it.
+const LEAST_OWN = 1e-4;
+const LEAST_BLURRED = 1e-5;
 
 // The light of a pixel that holds so much for its area.
 fn in_half_floats(light: vec3f) -> vec3f {
@@ -216,23 +217,16 @@ fn light_of(here: vec4f) -> vec3f {
     return in_half_floats(here.rgb / max(here.a, 1e-6));
 }
 
-// The part that blurs have of the light, from what their taps found and what these weigh; of a weight that
-// is negligible the pixel's own light takes the place.
-fn blurred_by(light: vec3f, mass: vec3f, wanted: vec3f, e: vec3f) -> vec3f {
-    let mean = light / max(mass, vec3f(1e-20));
-    return wanted * select(e, mean, wanted > vec3f(NEGLIGIBLE_WEIGHT));
-}
-
-// On no surface of the coarser level, a < 0, this level's own light stands in for it.
-fn with_coarser(blurred: vec3f, wanted: vec3f, e: vec3f, rest: vec3f, coarser: vec4f) -> Gathered {
-    let own = select(e, blurred / max(wanted, vec3f(1e-6)), wanted > vec3f(1e-3));
-    return Gathered(blurred + rest * select(own, coarser.rgb, coarser.a >= 0.0), wanted + rest, own);
+// Blurs of this mean and weight, with those of all coarser levels. On no surface of the coarser level, a < 0, this
+// mean stands in for it.
+fn with_coarser(mean: vec3f, wanted: vec3f, rest: vec3f, coarser: vec4f) -> Gathered {
+    return Gathered(wanted * mean + rest * select(mean, coarser.rgb, coarser.a >= 0.0), wanted + rest, mean);
 }
 
 // What fs_level tells: the mean of this level and the coarser ones, so that finer pixels can weigh it by
 // scales of their own.
 fn mean_of(g: Gathered) -> vec4f {
-    let mean = select(g.own, g.light / max(g.weight, vec3f(1e-6)), g.weight > vec3f(1e-3));
+    let mean = (g.light + LEAST_BLURRED * g.own) / (max(g.weight, vec3f(0.0)) + LEAST_BLURRED);
     return half_floats(vec4f(in_half_floats(mean), 1.0));
 }
 

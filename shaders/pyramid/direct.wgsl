@@ -43,6 +43,9 @@ const CUT = 8.0;
 // rest on levels, whose Gaussians are many pixels wide, was found on heads. Pixels that are not square have all.
 const TAPS = 0.8;
 const WIDER = 1.02;
+// Where weights fall no faster than this, by k₀₀ + k₁₁ on the frame and on levels, every other pixel is left out, as
+// on a chessboard: of a Gaussian of a square pixel that changes its sum by 2e-4; levels have no detail of a pixel.
+const SLOW = vec2f(0.25, 0.35);
 
 // Across a gap t weights that end fade otherwise than e^(−t²/2v). Where a layer is near, both take Gaussians that
 // are cut off there, exp(−3.59 r²/8v) of variance v; what e^(−t²/2v) fades more by is `Row::across`.
@@ -161,6 +164,8 @@ fn together(step: Step, scale: Scale) -> Together {
 fn summed(l: u32, center: vec2f, shape: Shape, plane: Plane, variance_mm2: f32, in_space: f32, own: f32) -> vec4f {
     let has_all = has_odd_pixels();
     let k = on_plane(variance_mm2 * select(WIDER, 1.0, has_all || l == 0u), plane.m, own);
+    let slow = select(SLOW.y, SLOW.x, l == 0u);
+    let apart = select(1.0, 2.0, k.x + k.z < slow && !has_all);
     // The ball, as it is seen.
     let mm = vec2f(plane.dx.x - plane.ray.x * plane.dx.z, plane.dy.y - plane.ray.y * plane.dy.z);
     let end = sqrt(CUT * max(variance_mm2 / (mm * mm) - own, vec2f(0.15)));
@@ -199,11 +204,13 @@ fn summed(l: u32, center: vec2f, shape: Shape, plane: Plane, variance_mm2: f32, 
         row.rest = 1.0 - k.z * (dy * dy);
         row.z = shape.z + plane.dy.z * dy;
         row.on_ray = to_ray.y * dy;
+        let step = i32(apart);
         var pixel = vec2i(vec2f(x, y));
-        for (var dx = x - center.x; dx <= to; dx += 2.0) {
+        pixel.x += (pixel.x + pixel.y) & (step - 1);
+        for (var dx = f32(pixel.x) - center.x; dx <= to; dx += 2.0 * apart) {
             tap(pixel, dx, true);
-            tap(pixel + vec2i(1, 0), dx + 1.0, dx + 1.0 <= to);
-            pixel.x += 2;
+            tap(pixel + vec2i(step, 0), dx + apart, dx + apart <= to);
+            pixel.x += 2 * step;
         }
     }
     return sum;
@@ -333,7 +340,7 @@ fn fs_level(@builtin(position) at: vec4f) -> @location(0) vec4f {
     let scale = scale_of(plane.m, shape.id);
     let l = firstTrailingBit(u32(level.scale));
     let t = together(steps[l + 1u], scale);
-    var blurred = t.weight * e;
+    var mean = e;
     if any(t.passed > vec3f(0.0)) {
         let variance_mm2 = t.variance * scale.mm2;
         let own = level.blurs[0].own;
@@ -342,12 +349,13 @@ fn fs_level(@builtin(position) at: vec4f) -> @location(0) vec4f {
         let told = 1.0 - own / max(t.variance, 1e-3);
         let in_space = 1.0 / (CUT * max(t.variance, NARROWEST_IN_SPACE) * scale.mm2 * pow(told, 1.5));
         let there = summed(l, vec2f(pixel), shape, plane, variance_mm2, in_space, own);
-        blurred += t.passed * select(vec3f(0.0), there.rgb / there.a - e, there.a > 1e-6);
+        let share = t.passed / max(t.weight, vec3f(1e-6));
+        mean += share * select(vec3f(0.0), there.rgb / there.a - e, there.a > 1e-6);
     }
     let rest = rest_at(scale);
     var coarser = vec4f(0.0);
     if any(rest > vec3f(0.0)) {
         coarser = coarser_at(pixel, plane, shape.id);
     }
-    return mean_of(with_coarser(blurred, t.weight, e, rest, coarser));
+    return mean_of(with_coarser(mean, t.weight, rest, coarser));
 }

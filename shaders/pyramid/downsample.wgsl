@@ -80,24 +80,27 @@ fn of_one_surface(pixel: vec2i, side: f32) -> Surface {
     let slope2 = dot(surface.tangent, surface.tangent);
     let tolerance = TOLERANCE * max(mm.x, mm.y) * sqrt(1.0 + slope2);
     var light = vec4f(0.0);
+    // Of their packed numbers, of which sines are linear.
     var z = 0.0;
-    var sines = vec2f(0.0);
+    var steps = vec2f(0.0);
+    // A pixel of this level along the surface, and the middle of this one.
+    let slope = 0.5 * surface.tangent * mm;
+    let per_tolerance = 2.0 / tolerance;
     for (var y = -1; y <= 2; y++) {
         for (var x = -1; x <= 2; x++) {
             let q = 2 * pixel + vec2i(x, y);
             let there = textureLoad(finer_shape, q, 0).rg;
             let e = textureLoad(finer_light, q, 0);
             // At the middle of this level's pixel, as the surface is inclined.
-            let offset = (0.5 - vec2f(f32(x), f32(y))) * 0.5 * mm;
-            let z_there = bitcast<f32>(there.y) + dot(surface.tangent, offset);
+            let z_there = bitcast<f32>(there.y) + dot(slope, 0.5 - vec2f(vec2i(x, y)));
             let is_outer = vec2f(f32(x == -1 || x == 2), f32(y == -1 || y == 2));
             let share = (3.0 - 2.0 * is_outer.x) * (3.0 - 2.0 * is_outer.y) / 64.0;
-            let off = (z_there - nearest) / tolerance;
+            let near = saturate(2.0 - per_tolerance * abs(z_there - nearest));
             let is_same = there.x >> 24u == surface.id && all(q >= vec2i(0)) && all(q <= last);
-            let w = select(0.0, share * saturate(2.0 - 2.0 * abs(off)), is_same);
+            let w = select(0.0, share * near, is_same);
             light += w * e;
             z += w * e.a * z_there;
-            sines += w * e.a * sines_of(there);
+            steps += w * e.a * steps_of(there);
         }
     }
     let area = light.a;
@@ -106,6 +109,6 @@ fn of_one_surface(pixel: vec2i, side: f32) -> Surface {
     }
     return Surface(
         half_floats(light),
-        packed(surface.id, z / area, sines / area),
+        packed(surface.id, z / area, sines_by(steps / area)),
     );
 }

@@ -35,6 +35,22 @@ fn host_surface(pixel: vec2i) -> HostSurface {
     return HostSurface(select(0u, id, is_surface), z);
 }
 
+// Where the weights of a profile begin.
+fn first_weight(id: u32) -> u32 {
+    if ONE_PROFILE {
+        return 0u;
+    }
+    return (id - 1u) * (view.rows * view.stride);
+}
+
+// The id that stands for all of equal profiles.
+fn stand_in(id: u32) -> u32 {
+    if ONE_PROFILE {
+        return 1u;
+    }
+    return u32(weights[first_weight(id) + 1u].w);
+}
+
 // The coarsest level that a pixel at z of a profile is blurred at.
 fn coarsest_level(z: f32, id: u32) -> u32 {
     let mm = abs(view.step.xy * z + view.step.zw);
@@ -42,5 +58,5 @@ fn coarsest_level(z: f32, id: u32) -> u32 {
     // across a ray, or in a pixel that is not square, by less than two rows at coarser ones.
     let row = ceil((-log2(max(mm.x, mm.y)) - view.first_octave) * ROWS_PER_OCTAVE) + 2.0;
     let i = u32(clamp(row, 0.0, f32(view.rows - 1u)));
-    return u32(weights[((id - 1u) * view.rows + i) * view.stride].w);
+    return u32(weights[first_weight(id) + i * view.stride].w);
 }

@@ -1,5 +1,6 @@
 // The frame as the pyramid has it: light and area, and where the surface is; and what its tiles hold, which
-// says how they can be blurred. A workgroup is a tile. Follows surface.wgsl.
+// says how they can be blurred. A workgroup is four tiles, one of level 1, that it packs one after the other.
+// Follows surface.wgsl.
 
 @group(0) @binding(4) var irradiance: texture_2d<f32>;
 @group(0) @binding(7) var packed_light: texture_storage_2d<rgba16float, write>;
@@ -11,41 +12,42 @@
 // ∂z over the mm of a pixel that a surface may have.
 const STEEPEST = 40.0;
 
-// What the tile holds, gathered over its pixels.
-var<workgroup> marks: atomic<u32>;
+// Tiles of a workgroup, along a side and in all.
+const SIDE = 2u;
+const TOGETHER = SIDE * SIDE;
+
+// What each of its tiles holds, gathered over its pixels.
+var<workgroup> marks: array<atomic<u32>, TOGETHER>;
 // Bits of a float, which as integers are in its order; of the darkest what all bits differ in.
-var<workgroup> brightest: atomic<u32>;
-var<workgroup> darkest: atomic<u32>;
+var<workgroup> brightest: array<atomic<u32>, TOGETHER>;
+var<workgroup> darkest: array<atomic<u32>, TOGETHER>;
 
 // Whether light is a number. By its bits, since compilers may take for granted that it is.
 fn is_finite(light: vec3f) -> bool {
     return all((bitcast<vec3u>(light) & vec3u(0x7f800000u)) != vec3u(0x7f800000u));
 }
 
-fn is_inside(pixel: vec2i) -> bool {
-    return all(pixel >= vec2i(0)) && all(pixel < vec2i(view.size));
-}
-
-// ∂z over the mm of a pixel, from the steps from its neighbour and to the one on the other side: the mean
-// where they agree; else of the shorter one, as it curves towards the pixel, since the other jumps.
-// Beyond the frame nothing is known. Follows `tangent` and `one_sided` of gaussian_sum.wgsl.
-fn tangent(pixel: vec2i, step: vec2i, sides: vec2f, mm: f32) -> f32 {
-    let lengths2 = sides * sides + mm * mm;
-    let has_last = is_inside(pixel - step);
-    let has_next = is_inside(pixel + step);
+// ∂z over the mm of a pixel that is the `place`th of its row or column, from the steps from its neighbour and to the
+// one on the other side: the mean where they agree; else of the shorter one, as it curves towards the pixel, since
+// the other jumps. Beyond the frame nothing is known. Follows `tangent` and `one_sided` of gaussian_sum.wgsl.
+fn tangent(pixel: vec2i, step: vec2i, place: i32, last: i32, sides: vec2f, mm: f32) -> f32 {
+    let mm2 = mm * mm;
+    let lengths2 = sides * sides + mm2;
+    let has_last = place > 0;
+    let has_next = place < last;
     // A factor of two in length is more than a smooth surface changes in a pixel.
     let is_smooth = max(lengths2.x, lengths2.y) <= 4.0 * min(lengths2.x, lengths2.y);
     var known = 0.5 * (sides.x + sides.y);
     var dz = known;
     if !(has_last && has_next && is_smooth) {
         let is_forward = has_next && (!has_last || lengths2.y < lengths2.x);
-        let way = select(-step, step, is_forward);
+        let way = select(-1, 1, is_forward);
         let first = select(-sides.x, sides.y, is_forward);
-        let beyond = z_at(pixel + 2 * way) - z_at(pixel + way);
+        let beyond = z_at(pixel + 2 * way * step) - z_at(pixel + way * step);
+        let place_beyond = place + 2 * way;
         // Maybe to infinity.
-        let is_known = is_inside(pixel + 2 * way) && abs(beyond) < STEEPEST * mm;
+        let is_known = place_beyond >= 0 && place_beyond <= last && abs(beyond) < STEEPEST * mm;
         let second = select(0.0, beyond, is_known);
-        let mm2 = mm * mm;
         let first2 = first * first + mm2;
         let both2 = (first + second) * (first + second) + 4.0 * mm2;
         let turn = (first * second + mm2) * inverseSqrt(first2 * (second * second + mm2));
@@ -58,11 +60,18 @@ fn tangent(pixel: vec2i, step: vec2i, sides: vec2f, mm: f32) -> f32 {
     return select(0.0, clamp(dz / mm, -STEEPEST, STEEPEST), abs(known) < STEEPEST * mm);
 }
 
-// How difficult the surface at a pixel is, a bit each for .03, .125, .5 and 2: second differences of depth
-// over the mm of a pixel, of which a level has twice as many as the one before.
+// How difficult the surface at a pixel is, a bit for .03, .125, .5 or 2, whichever it passes last: second
+// differences of depth over the mm of a pixel, of which a level has twice as many as the one before.
 fn difficulty_bits(bend: f32) -> u32 {
-    let passed = vec4<bool>(vec4f(bend) > vec4f(0.03125, 0.125, 0.5, 2.0));
-    return dot(vec4u(passed), vec4u(1u, 2u, 4u, 8u)) << DIFFICULTY_SHIFT;
+    // Half the exponent of a float: 61 from 2⁻⁵ on, 64 from 2 on.
+    let passed = clamp(bitcast<u32>(bend) >> 24u, 60u, 64u) - 60u;
+    return ((1u << passed) >> 1u) << DIFFICULTY_SHIFT;
+}
+
+// The area of a surface over that of one that faces the camera, |∂p/∂x × ∂p/∂y|: by how its depth changes over the
+// mm of a pixel, and the ray through it.
+fn area_of(slope: vec2f, ray: vec2f) -> f32 {
+    return length(vec3f(slope, 1.0 + dot(ray, slope)));
 }
 
 const MOST_LIGHT = 65504.0;
@@ -102,7 +111,6 @@ struct Packed {
 }
 
 fn packed_at(pixel: vec2i, here: HostSurface) -> Packed {
-    let id = u32(weights[(here.id - 1u) * view.rows * view.stride + 1u].w);
     let z = here.z;
     let last = vec2i(view.size) - 1;
     let left = z_at(vec2i(max(pixel.x - 1, 0), pixel.y));
@@ -116,12 +124,11 @@ fn packed_at(pixel: vec2i, here: HostSurface) -> Packed {
     let north = select(z - above, below - z, pixel.y == 0);
     let south = select(below - z, z - above, pixel.y == last.y);
     let bend = max(abs(east - west) / mm.x, abs(south - north) / mm.y);
-    var shape = Shape(id, z, vec2f(0.0));
-    shape.tangent.x = tangent(pixel, vec2i(1, 0), vec2f(west, east), mm.x);
-    shape.tangent.y = tangent(pixel, vec2i(0, 1), vec2f(north, south), mm.y);
-    let plane = plane_of(pixel, shape);
-    let area = length(cross(plane.dx, plane.dy)) / (mm.x * mm.y);
-    let sines = shape.tangent * inverseSqrt(1.0 + shape.tangent * shape.tangent);
+    let along = tangent(pixel, vec2i(1, 0), pixel.x, last.x, vec2f(west, east), mm.x);
+    let down = tangent(pixel, vec2i(0, 1), pixel.y, last.y, vec2f(north, south), mm.y);
+    let slope = vec2f(along, down);
+    let area = area_of(slope * sign(view.step.xy * z + view.step.zw), ray(pixel).xy);
+    let sines = slope * inverseSqrt(1.0 + slope * slope);
     let host = textureLoad(irradiance, vec2i(view.first_pixel) + pixel, 0).rgb;
     var light = vec4f(0.0);
     var difficulty = difficulty_bits(bend);
@@ -134,14 +141,14 @@ fn packed_at(pixel: vec2i, here: HostSurface) -> Packed {
         // do not look for.
         difficulty = difficulty_bits(MOST_LIGHT);
     }
-    return Packed(half_floats(light), packed(id, z, sines), difficulty, bend, brightness);
+    return Packed(half_floats(light), packed(stand_in(here.id), z, sines), difficulty, bend, brightness);
 }
 
-// Packs a pixel of the viewport, and adds what it holds to what its tile does.
-fn pack(pixel: vec2i) {
+// Packs a pixel of the viewport, and adds what it holds to what its tile does, the `i`th of the workgroup.
+fn pack(pixel: vec2i, i: u32) {
     let here = host_surface(pixel);
     if here.id == 0u || here.id > view.profiles {
-        atomicOr(&marks, NOT_SKIN);
+        atomicOr(&marks[i], NOT_SKIN);
         return;
     }
     let packed = packed_at(pixel, here);
@@ -153,35 +160,50 @@ fn pack(pixel: vec2i) {
         let place = pixel & vec2i(i32(TILE) - 1);
         let before = select(vec2i(0), vec2i(-1), place < vec2i(REACH));
         let beside = before + select(vec2i(0), vec2i(1), place >= vec2i(i32(TILE) - REACH));
-        let tile = pixel / i32(TILE);
+        let tile = pixel >> vec2u(firstTrailingBit(TILE));
         tell(tile + vec2i(beside.x, 0), packed.brightness);
         tell(tile + vec2i(0, beside.y), packed.brightness);
     }
     let level = coarsest_level(here.z, id);
-    atomicOr(&marks, (1u << level) | packed.difficulty | (1u << (PROFILE_SHIFT + id - 1u)));
-    atomicMax(&brightest, bitcast<u32>(packed.brightness));
-    atomicMax(&darkest, ~bitcast<u32>(packed.brightness));
+    atomicOr(&marks[i], (1u << level) | packed.difficulty | (1u << (PROFILE_SHIFT + id - 1u)));
+    atomicMax(&brightest[i], bitcast<u32>(packed.brightness));
+    atomicMax(&darkest[i], ~bitcast<u32>(packed.brightness));
+}
+
+// The `i`th tile of a workgroup.
+fn tile_in(group: vec2u, i: u32) -> vec2u {
+    return SIDE * group + vec2u(i % SIDE, i / SIDE);
+}
+
+// Adds what a tile of the workgroup holds to what a tile of a level does.
+fn add(level: u32, tile: vec2u, i: u32) {
+    let grid = grids[level];
+    let first = 3u * (grid.z + tile.y * grid.x + tile.x);
+    atomicOr(&contents[first], atomicLoad(&marks[i]));
+    atomicMax(&contents[first + 1u], atomicLoad(&brightest[i]));
+    atomicMax(&contents[first + 2u], atomicLoad(&darkest[i]));
 }
 
 @compute @workgroup_size(TILE, TILE)
-fn pack_tile(
-    @builtin(global_invocation_id) at: vec3u,
-    @builtin(workgroup_id) tile: vec3u,
+fn pack_tiles(
+    @builtin(local_invocation_id) place: vec3u,
+    @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    if all(at.xy < view.size) {
-        pack(vec2i(at.xy));
-    } else {
-        atomicOr(&marks, NOT_SKIN);
+    for (var i = 0u; i < TOGETHER; i++) {
+        let pixel = TILE * tile_in(group.xy, i) + place.xy;
+        if all(pixel < view.size) {
+            pack(vec2i(pixel), i);
+        } else {
+            atomicOr(&marks[i], NOT_SKIN);
+        }
     }
     workgroupBarrier();
-    // To the tile of each level that this one is a part of.
-    if thread <= view.levels {
-        let grid = grids[thread];
-        let place = tile.xy >> vec2u(thread);
-        let first = 3u * (grid.z + place.y * grid.x + place.x);
-        atomicOr(&contents[first], atomicLoad(&marks));
-        atomicMax(&contents[first + 1u], atomicLoad(&brightest));
-        atomicMax(&contents[first + 2u], atomicLoad(&darkest));
+    // To themselves, and to the tile of each level that they are a part of.
+    let level = thread / TOGETHER;
+    let i = thread % TOGETHER;
+    let tile = tile_in(group.xy, i);
+    if level <= view.levels && all(tile < grids[0].xy) {
+        add(level, tile >> vec2u(level), i);
     }
 }

@@ -11,7 +11,8 @@ struct Corner {
     @location(4) @interpolate(linear) k1m: vec3f,
     @location(5) @interpolate(linear) k20: vec3f,
     @location(6) @interpolate(linear) k02: vec3f,
-    @location(7) @interpolate(linear) s2: vec2f,
+    // And where the pixel is in the coarser mean.
+    @location(7) @interpolate(linear) s2: vec4f,
     @location(8) @interpolate(linear) s3: vec4f,
     @location(9) @interpolate(linear) square: vec3f,
     @location(10) @interpolate(linear) wanted: vec3f,
@@ -61,7 +62,7 @@ fn vs_corner(
     let s1 = exp2(taps.s1);
     var out = Corner();
     out.at = on_screen(tile, vertex);
-    out.k00 = vec4f(taps.k00 + taps.square, rest.r);
+    out.k00 = vec4f(taps.k00 + taps.square + LEAST_OWN, rest.r);
     out.k10 = vec4f(taps.k10 + s1.x * taps.square, rest.g);
     out.k01 = vec4f(taps.k01 + s1.y * taps.square, rest.b);
     out.k11 = taps.k11 + s1.z * taps.square;
@@ -69,7 +70,9 @@ fn vs_corner(
     let s2 = exp2(taps.s2);
     out.k20 = taps.k20 + s2.x * taps.square;
     out.k02 = taps.k02 + s2.y * taps.square;
-    out.s2 = s2.zw;
+    // The texture may be larger than the level.
+    let uv = vec2f((tile + corner_of(vertex)) * TILE) / (2.0 * vec2f(textureDimensions(coarser_mean)));
+    out.s2 = vec4f(s2.zw, uv);
     out.s3 = exp2(taps.s3);
     out.square = taps.square;
     out.wanted = taps.wanted;
@@ -81,49 +84,51 @@ fn vs_corner(
 var<private> light: vec3f;
 var<private> mass: vec3f;
 
-fn both(pixel: vec2i, offset: vec2i) -> vec4f {
-    return textureLoad(here_light, pixel + offset, 0) + textureLoad(here_light, pixel - offset, 0);
+fn pair(there: vec4f, opposite: vec4f, k: vec3f) {
+    light += k * (there.rgb + opposite.rgb);
+    mass += k * (there.a + opposite.a);
 }
 
-fn pair(pixel: vec2i, offset: vec2i, k: vec3f) {
-    let there = both(pixel, offset);
-    light += k * there.rgb;
-    mass += k * there.a;
+fn at(pixel: vec2i) -> vec4f {
+    return textureLoad(here_light, pixel, 0);
 }
 
-fn gathered(pixel: vec2i, here: vec4f, e: vec3f, tile: Corner) -> Gathered {
+fn gathered(here: vec4f, pixel: vec2i, tile: Corner) -> Gathered {
     let u = tile.lattice.xy;
     let v = tile.lattice.zw;
+    // Along u and v to either side.
+    let east = pixel + u;
+    let west = pixel - u;
+    let south = pixel + v;
+    let north = pixel - v;
     light = tile.k00.rgb * here.rgb;
     mass = tile.k00.rgb * here.a;
-    pair(pixel, u, tile.k10.rgb);
-    pair(pixel, v, tile.k01.rgb);
-    pair(pixel, u + v, tile.k11);
-    pair(pixel, u - v, tile.k1m);
+    pair(at(east), at(west), tile.k10.rgb);
+    pair(at(south), at(north), tile.k01.rgb);
+    pair(at(south + u), at(north - u), tile.k11);
+    pair(at(north + u), at(south - u), tile.k1m);
     if THIRTEEN {
-        pair(pixel, 2 * u, tile.k20);
-        pair(pixel, 2 * v, tile.k02);
+        pair(at(east + u), at(west - u), tile.k20);
+        pair(at(south + v), at(north - v), tile.k02);
     }
     if SQUARE {
         if any(tile.square > vec3f(1e-6)) {
-            let outer = tile.s2.x * both(pixel, 2 * u + v)
-                + tile.s2.y * both(pixel, 2 * u - v)
-                + tile.s3.x * both(pixel, u + 2 * v)
-                + tile.s3.y * both(pixel, 2 * v - u)
-                + tile.s3.z * both(pixel, 2 * u + 2 * v)
-                + tile.s3.w * both(pixel, 2 * u - 2 * v);
+            let far_east = east + u;
+            let far_west = west - u;
+            let outer = tile.s2.x * (at(far_east + v) + at(far_west - v))
+                + tile.s2.y * (at(far_east - v) + at(far_west + v))
+                + tile.s3.x * (at(south + v + u) + at(north - v - u))
+                + tile.s3.y * (at(south + v - u) + at(north - v + u))
+                + tile.s3.z * (at(far_east + v + v) + at(far_west - v - v))
+                + tile.s3.w * (at(far_east - v - v) + at(far_west + v + v));
             light += tile.square * outer.rgb;
             mass += tile.square * outer.a;
         }
     }
-    let wanted = tile.wanted;
-    let blurred = blurred_by(light, mass, wanted, e);
     let rest = vec3f(tile.k00.a, tile.k10.a, tile.k01.a);
-    // The texture may be larger than the level.
-    let uv = (vec2f(pixel) + 0.5) / (2.0 * vec2f(textureDimensions(coarser_mean)));
-    let coarser = textureSampleLevel(coarser_mean, linear, uv, 0.0);
+    let coarser = textureSampleLevel(coarser_mean, linear, tile.s2.zw, 0.0);
     let found = vec4f(coarser.rgb / max(coarser.a, 1e-3), coarser.a - 1e-3);
-    return with_coarser(blurred, wanted, e, rest, found);
+    return with_coarser(light / mass, tile.wanted, rest, found);
 }
 
 @fragment
@@ -133,7 +138,7 @@ fn fs_level(tile: Corner) -> @location(0) vec4f {
     if here.a <= 0.0 {
         return vec4f(0.0);
     }
-    return mean_of(gathered(pixel, here, light_of(here), tile));
+    return mean_of(gathered(here, pixel, tile));
 }
 
 @fragment
@@ -145,5 +150,5 @@ fn fs_frame(tile: Corner) -> @location(0) vec4f {
         discard;
     }
     let e = light_of(here);
-    return scattered(pixel, gathered(pixel, here, e, tile), e, share);
+    return scattered(pixel, gathered(here, pixel, tile), e, share);
 }

@@ -155,12 +155,20 @@ fn is_of(shape: vec2u, id: u32) -> bool {
 
 // Slopes are kept as sines.
 fn packed(id: u32, z: f32, sines: vec2f) -> vec2u {
-    let steps = vec2u(clamp(sines * 2047.0 + 2048.5, vec2f(0.0), vec2f(4095.0)));
+    let steps = vec2u(sines * 2047.0 + 2048.5);
     return vec2u((id << 24u) | (steps.y << 12u) | steps.x, bitcast<u32>(z));
 }
 
+fn steps_of(shape: vec2u) -> vec2f {
+    return vec2f(vec2u(shape.x, shape.x >> 12u) & vec2u(0xfffu));
+}
+
+fn sines_by(steps: vec2f) -> vec2f {
+    return (steps - 2048.0) / 2047.0;
+}
+
 fn sines_of(shape: vec2u) -> vec2f {
-    return (vec2f(vec2u(shape.x, shape.x >> 12u) & vec2u(0xfffu)) - 2048.0) / 2047.0;
+    return sines_by(steps_of(shape));
 }
 
 fn unpacked(shape: vec2u) -> Shape {

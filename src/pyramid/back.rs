@@ -160,7 +160,7 @@ impl Back {
 }
 
 impl Groups {
-    /// Packs the tiles of the frame, after the frame itself was packed.
+    /// Packs so many groups of tiles, after the frame itself was packed.
     pub(super) fn pack(&self, pass: &mut wgpu::ComputePass, compute: &Compute, [x, y]: [u32; 2]) {
         pass.set_pipeline(&compute.pipeline);
         pass.set_bind_group(0, &self.pack, &[]);

@@ -20,12 +20,10 @@ pub(crate) use passes::OVERLAY;
 use passes::{LIGHT, OverTiles, Passes};
 use scratch::{CLASSES, DRAW_BYTES, Scratch};
 
-/// What doubt (`list_tiles.wgsl`) there may be in a tile for it to be planar, over the error of the plan and at
-/// most in all: of the frame, and of its levels. Found on heads: beyond, errors grow.
-const FRAME_LIMIT_ERRORS: f32 = 98.0;
-const FRAME_LIMIT: f32 = 0.7;
-const LEVEL_LIMIT_ERRORS: f32 = 184.0;
-const LEVEL_LIMIT: f32 = 1.0;
+/// What doubt (`list_tiles.wgsl`) there may be in a tile for it to be planar, over the error of the plan: of the frame,
+/// and of its levels. Found on heads: beyond, errors grow.
+const FRAME_LIMIT: f32 = 98.0;
+const LEVEL_LIMIT: f32 = 184.0;
 
 /// The passes of a plan, and its weights.
 #[derive(Debug)]
@@ -204,8 +202,8 @@ impl Pyramid {
             profiles: plan.profiles.len() as u32,
             first_pixel: frame.rectangle().first(),
             size: size.into(),
-            frame_limit: FRAME_LIMIT.min(FRAME_LIMIT_ERRORS * plan.predicted_error()),
-            level_limit: LEVEL_LIMIT.min(LEVEL_LIMIT_ERRORS * plan.predicted_error()),
+            frame_limit: FRAME_LIMIT * plan.predicted_error(),
+            level_limit: LEVEL_LIMIT * plan.predicted_error(),
             levels: last as u32,
             back_reach,
             back_growth,
@@ -402,9 +400,11 @@ impl Pyramid {
             let mut pass = recorder.dispatch("subsurface::pyramid pack");
             pass.set_pipeline(&passes.pack.pipeline);
             pass.set_bind_group(0, &groups.pack, &[]);
-            pass.dispatch_workgroups(x, y, 1);
+            // Of four tiles each.
+            let packing = base.tiles.map(|count| count.div_ceil(2));
+            pass.dispatch_workgroups(packing[0], packing[1], 1);
             if let Some(back) = &groups.back {
-                back.pack(&mut pass, &passes.pack_back, base.tiles);
+                back.pack(&mut pass, &passes.pack_back, packing);
             }
             pass.set_pipeline(&passes.list_tiles.pipeline);
             pass.set_bind_group(0, &groups.list_tiles, &[]);

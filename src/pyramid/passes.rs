@@ -66,11 +66,14 @@ pub(super) struct Passes {
 
 impl Passes {
     pub(super) fn new(device: &Device, plan: &Weights, output: Output) -> Self {
+        let flag = |on| f64::from(u8::from(on));
+        let one_profile = flag(plan.has_one_profile());
         let compute = |entry: &str, files: &[&str], bindings: &[(u32, BindingType)]| {
             let label = format!("subsurface::pyramid {entry}");
             let module = gpu::module(device, &label, files);
             let layout = gpu::layout(device, &label, ShaderStages::COMPUTE, bindings);
-            let pipeline = gpu::compute_pipeline(device, &label, &module, entry, &layout);
+            let constants = [("ONE_PROFILE", one_profile)];
+            let pipeline = gpu::compute_pipeline(device, &label, &module, entry, &layout, &constants);
             Compute { layout, pipeline }
         };
         let over_tiles = |entry: &str,
@@ -85,7 +88,6 @@ impl Passes {
                 "fs_frame" => vec![Some(output.target(ColorWrites::ALL))],
                 _ => targets.iter().map(|t| Some((*t).into())).collect(),
             };
-            let flag = |on| f64::from(u8::from(on));
             let pipeline = |class: u32, (vertex, files): (&str, &[&str]), has_back: bool| {
                 let mut constants = vec![("CLASS", class.into())];
                 if let Some(kinds) = kinds {
@@ -98,7 +100,7 @@ impl Passes {
                     ]);
                 }
                 if files == DIRECT {
-                    constants.push(("ONE_PROFILE", flag(plan.has_one_profile())));
+                    constants.push(("ONE_PROFILE", one_profile));
                     constants.push(("BACK", flag(has_back)));
                 }
                 let module: ShaderModule = gpu::module(device, &label, files);
@@ -147,7 +149,7 @@ impl Passes {
         );
         Self {
             pack: compute(
-                "pack_tile",
+                "pack_tiles",
                 PACK,
                 &[
                     (0, UNIFORM),

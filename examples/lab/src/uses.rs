@@ -25,8 +25,11 @@ const TILE: u32 = 8;
 /// Words of an indirect draw, and draws of a level.
 const DRAW_WORDS: usize = 4;
 const KINDS: usize = 2;
-/// What a thread that leaves at once costs of `pack`, which is counted by the compiler's own estimate.
+/// What a pixel that is left at once costs of `pack`, which is counted by the compiler's own estimate.
 const LEAVES_AT_ONCE: u32 = 5;
+/// Pixels of a thread of `pack` and `pack back`, in a loop; and how many the compiler's estimate takes that for.
+const TOGETHER: u32 = 4;
+const GUESSED_ROUNDS: u32 = 8;
 
 pub fn main() -> ExitCode {
     match run() {
@@ -156,13 +159,18 @@ impl<'a> Seen<'a> {
         if !method.ends_with("in place") {
             uses.add(method, "copy tiles", self.copied, 0, "", "");
         }
-        uses.add(method, "pack", on, off / LEAVES_AT_ONCE, "guess", "");
+        let [rounds_on, rounds_off] = [on, off / LEAVES_AT_ONCE].map(|threads| threads / GUESSED_ROUNDS);
+        uses.add(method, "pack", rounds_on, rounds_off, "guess", "");
         let threads = |l: usize| counted.levels[l][0] * counted.levels[l][1] * TILE * TILE;
         for (l, tiles) in counted.back.iter().enumerate() {
             let on_back = tiles.iter().filter(|holds| **holds != 0).count() as u32 * TILE * TILE;
             // Tiles without skin are left at once.
-            let (pass, threads) = if l == 0 { ("pack back", on) } else { ("halve back", threads(l)) };
-            uses.add(method, pass, on_back, threads - on_back, "", "");
+            if l == 0 {
+                let [on_back, rest] = [on_back, on - on_back].map(|threads| threads / TOGETHER);
+                uses.add(method, "pack back", on_back, rest, "", &TOGETHER.to_string());
+            } else {
+                uses.add(method, "halve back", on_back, threads(l) - on_back, "", "");
+            }
         }
         let tiles: u32 = counted.levels.iter().map(|[x, y]| x * y).sum();
         let listed: u32 = counted.tiles.iter().flatten().sum();
@@ -232,7 +240,7 @@ impl<'a> Seen<'a> {
         let mm2 = large / (large / small).sqrt().min(NARROWEST);
         let rows = plan.rows(0);
         let next = rows.partition_point(|row| f64::from(row.px_per_mm) < mm2.sqrt().recip());
-        Scale { mm2, rows: [next.saturating_sub(1), next.min(rows.len() - 1)] }
+        Scale { mm2, m: [m00, m01, m11], rows: [next.saturating_sub(1), next.min(rows.len() - 1)] }
     }
 
     /// Of a surface that faces the camera where the skin is nearest.
@@ -259,7 +267,7 @@ impl<'a> Seen<'a> {
     /// Rows and pairs of taps of the Gaussians that are summed directly at a pixel, as `gathered` in direct.wgsl has
     /// it; on a level as `fs_level` does, with the frame's pixels for those of the level.
     fn sums(&self, plan: &Plan, on_level: usize, pixel: usize) -> Vec<[f64; 2]> {
-        let Scale { mm2, rows: [row, next] } = self.scale(plan, pixel);
+        let Scale { mm2, m, rows: [row, next] } = self.scale(plan, pixel);
         let (row, next) = (&plan.rows(0)[row], &plan.rows(0)[next]);
         let at = DVec2::new((pixel as u32 % SIZE[0]).into(), (pixel as u32 / SIZE[0]).into()) + 0.5;
         let facing_mm = -self.points[pixel].z * self.ray_step;
@@ -294,6 +302,8 @@ impl<'a> Seen<'a> {
             let mm = facing_mm * side;
             let variance_px2 = variance * mm2 * side * side / (mm * mm) - own;
             let reach = (TAPS * (CUT * variance_px2.max(0.15)).sqrt()).min(REACH);
+            let slow = SLOW[usize::from(level > 0)];
+            let apart = if fall(variance * mm2, m, own) < slow { 2 } else { 1 };
             let center = at / side - 0.5;
             let last = (DVec2::new(SIZE[0].into(), SIZE[1].into()) / side).floor() - 1.0;
             let (first, end) =
@@ -302,8 +312,10 @@ impl<'a> Seen<'a> {
             for y in first.y as i32..=end.y as i32 {
                 let half = (reach * reach - (f64::from(y) - center.y).powi(2)).max(0.0).sqrt();
                 rows += 1.0;
-                let row = (center.x + half).floor().min(last.x) - (center.x - half).ceil().max(0.0) + 1.0;
-                pairs += (0.5 * row.max(0.0)).ceil();
+                let first = (center.x - half).ceil().max(0.0) as i32;
+                let first = first + ((first + y) & (apart - 1));
+                let row = (center.x + half).floor().min(last.x) - f64::from(first) + 1.0;
+                pairs += (0.5 * row.max(0.0) / f64::from(apart)).ceil();
             }
             sums.push([rows, pairs]);
         }
@@ -324,9 +336,23 @@ impl<'a> Seen<'a> {
     }
 }
 
+/// k₀₀ + k₁₁ of `on_plane` in direct.wgsl.
+fn fall(variance_mm2: f64, [m00, m01, m11]: [f64; 3], own: f64) -> f64 {
+    let by = variance_mm2 / (m00 * m11 - m01 * m01).max(1e-30);
+    let c = [by * m11 - own, by * m00 - own].map(|c| c.max(0.02));
+    // Of the frame, which nothing blurred before.
+    let widened = if own == 0.0 { c.map(|c| c.max(0.13 + 0.37 * c)) } else { c };
+    let product = widened[0] * widened[1];
+    let most = 0.98 * product.sqrt();
+    let off = (-by * m01 * (product / (c[0] * c[1])).sqrt()).clamp(-most, most);
+    (widened[0] + widened[1]) / (CUT * (product - off * off))
+}
+
 struct Scale {
     /// That a variance of one square pixel stands for.
     mm2: f64,
+    /// M₀₀, M₀₁, M₁₁ in mm².
+    m: [f64; 3],
     rows: [usize; 2],
 }
 
@@ -340,6 +366,9 @@ const ROWS_ONCE: f64 = 2.0 / 3.0;
 const REACH: f64 = 6.0;
 const CUT: f64 = 8.0;
 const TAPS: f64 = 0.8;
+/// On the frame and on levels.
+const SLOW: [f64; 2] = [0.25, 0.35];
+
 const LEAST_WEIGHT: f64 = 0.004;
 const WIDE_PX2: f64 = 1.0;
 
