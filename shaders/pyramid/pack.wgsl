@@ -16,7 +16,8 @@ const STEEPEST = 40.0;
 const SIDE = 2u;
 const TOGETHER = SIDE * SIDE;
 
-// What each of its tiles holds, gathered over its pixels.
+// Which of its tiles hold anything but skin, a bit each; and what each holds, gathered over its pixels.
+var<workgroup> has_other: atomic<u32>;
 var<workgroup> marks: array<atomic<u32>, TOGETHER>;
 // Bits of a float, which as integers are in its order; of the darkest what all bits differ in.
 var<workgroup> brightest: array<atomic<u32>, TOGETHER>;
@@ -144,12 +145,12 @@ fn packed_at(pixel: vec2i, here: HostSurface) -> Packed {
     return Packed(half_floats(light), packed(stand_in(here.id), z, sines), difficulty, bend, brightness);
 }
 
-// Packs a pixel of the viewport, and adds what it holds to what its tile does, the `i`th of the workgroup.
-fn pack(pixel: vec2i, i: u32) {
+// Packs a pixel of the viewport, and adds what it holds to what its tile does, the `i`th of the workgroup; false where
+// it is not skin.
+fn pack(pixel: vec2i, i: u32) -> bool {
     let here = host_surface(pixel);
     if here.id == 0u || here.id > view.profiles {
-        atomicOr(&marks[i], NOT_SKIN);
-        return;
+        return false;
     }
     let packed = packed_at(pixel, here);
     let id = packed.shape.x >> 24u;
@@ -168,6 +169,7 @@ fn pack(pixel: vec2i, i: u32) {
     atomicOr(&marks[i], (1u << level) | packed.difficulty | (1u << (PROFILE_SHIFT + id - 1u)));
     atomicMax(&brightest[i], bitcast<u32>(packed.brightness));
     atomicMax(&darkest[i], ~bitcast<u32>(packed.brightness));
+    return true;
 }
 
 // The `i`th tile of a workgroup.
@@ -179,7 +181,8 @@ fn tile_in(group: vec2u, i: u32) -> vec2u {
 fn add(level: u32, tile: vec2u, i: u32) {
     let grid = grids[level];
     let first = 3u * (grid.z + tile.y * grid.x + tile.x);
-    atomicOr(&contents[first], atomicLoad(&marks[i]));
+    let other = select(0u, NOT_SKIN, ((atomicLoad(&has_other) >> i) & 1u) != 0u);
+    atomicOr(&contents[first], atomicLoad(&marks[i]) | other);
     atomicMax(&contents[first + 1u], atomicLoad(&brightest[i]));
     atomicMax(&contents[first + 2u], atomicLoad(&darkest[i]));
 }
@@ -190,14 +193,14 @@ fn pack_tiles(
     @builtin(workgroup_id) group: vec3u,
     @builtin(local_invocation_index) thread: u32,
 ) {
+    var skin = 0u;
     for (var i = 0u; i < TOGETHER; i++) {
         let pixel = TILE * tile_in(group.xy, i) + place.xy;
         if all(pixel < view.size) {
-            pack(vec2i(pixel), i);
-        } else {
-            atomicOr(&marks[i], NOT_SKIN);
+            skin |= u32(pack(vec2i(pixel), i)) << i;
         }
     }
+    atomicOr(&has_other, ~skin);
     workgroupBarrier();
     // To themselves, and to the tile of each level that they are a part of.
     let level = thread / TOGETHER;
