@@ -44,8 +44,10 @@ const CUT = 8.0;
 const TAPS = 0.8;
 const WIDER = 1.02;
 // Where weights fall no faster than this, by k₀₀ + k₁₁ on the frame and on levels, every other pixel is left out, as
-// on a chessboard: of a Gaussian of a square pixel that changes its sum by 2e-4; levels have no detail of a pixel.
+// on a chessboard whose fields hold the nearest one: of a Gaussian of a square pixel that changes the sum by 2e-4, and
+// levels have no detail of a pixel. There taps go farther, since what ends with a step is not the same on both fields.
 const SLOW = vec2f(0.25, 0.35);
+const SPARSE_TAPS = 0.9;
 
 // Across a gap t weights that end fade otherwise than e^(−t²/2v). Where a layer is near, both take Gaussians that
 // are cut off there, exp(−3.59 r²/8v) of variance v; what e^(−t²/2v) fades more by is `Row::across`.
@@ -165,11 +167,12 @@ fn summed(l: u32, center: vec2f, shape: Shape, plane: Plane, variance_mm2: f32, 
     let has_all = has_odd_pixels();
     let k = on_plane(variance_mm2 * select(WIDER, 1.0, has_all || l == 0u), plane.m, own);
     let slow = select(SLOW.y, SLOW.x, l == 0u);
-    let apart = select(1.0, 2.0, k.x + k.z < slow && !has_all);
+    let is_sparse = k.x + k.z < slow && !has_all;
     // The ball, as it is seen.
     let mm = vec2f(plane.dx.x - plane.ray.x * plane.dx.z, plane.dy.y - plane.ray.y * plane.dy.z);
     let end = sqrt(CUT * max(variance_mm2 / (mm * mm) - own, vec2f(0.15)));
-    let reach = min(select(TAPS, 1.0, has_all) * end, vec2f(REACH));
+    let part = select(select(TAPS, SPARSE_TAPS, is_sparse), 1.0, has_all);
+    let reach = min(part * end, vec2f(REACH));
     let first = max(ceil(center - reach), vec2f(0.0));
     let last = min(floor(center + reach), vec2f(textureDimensions(shapes, l)) - 1.0);
     let r = vec3f(plane.ray, 1.0);
@@ -193,6 +196,10 @@ fn summed(l: u32, center: vec2f, shape: Shape, plane: Plane, variance_mm2: f32, 
         row.across = select(0.0, across, behind.x >> 24u == shape.id);
     }
     sum = vec4f(0.0);
+    let step = select(1, 2, is_sparse);
+    let apart = f32(step);
+    // Of x + y of the pixels that are taken.
+    let parity = i32(round(center.x)) + i32(round(center.y));
     let per_reach2 = 1.0 / (reach.y * reach.y);
     for (var y = first.y; y <= last.y; y += 1.0) {
         let dy = y - center.y;
@@ -204,9 +211,8 @@ fn summed(l: u32, center: vec2f, shape: Shape, plane: Plane, variance_mm2: f32, 
         row.rest = 1.0 - k.z * (dy * dy);
         row.z = shape.z + plane.dy.z * dy;
         row.on_ray = to_ray.y * dy;
-        let step = i32(apart);
         var pixel = vec2i(vec2f(x, y));
-        pixel.x += (pixel.x + pixel.y) & (step - 1);
+        pixel.x += (pixel.x + pixel.y + parity) & (step - 1);
         for (var dx = f32(pixel.x) - center.x; dx <= to; dx += 2.0 * apart) {
             tap(pixel, dx, true);
             tap(pixel + vec2i(step, 0), dx + apart, dx + apart <= to);

@@ -80,10 +80,10 @@ fn of_one_surface(pixel: vec2i, side: f32) -> Surface {
     let slope2 = dot(surface.tangent, surface.tangent);
     let tolerance = TOLERANCE * max(mm.x, mm.y) * sqrt(1.0 + slope2);
     var light = vec4f(0.0);
-    // Of their packed numbers, of which sines are linear.
     var z = 0.0;
+    // Of sines, as they are packed.
     var steps = vec2f(0.0);
-    // A pixel of this level along the surface, and the middle of this one.
+    // How z changes over a pixel of the finer level.
     let slope = 0.5 * surface.tangent * mm;
     let per_tolerance = 2.0 / tolerance;
     for (var y = -1; y <= 2; y++) {

@@ -69,8 +69,8 @@ fn difficulty_bits(bend: f32) -> u32 {
     return ((1u << passed) >> 1u) << DIFFICULTY_SHIFT;
 }
 
-// The area of a surface over that of one that faces the camera, |∂p/∂x × ∂p/∂y|: by how its depth changes over the
-// mm of a pixel, and the ray through it.
+// The area of a surface over that of one that faces the camera, |∂p/∂x × ∂p/∂y|: by how its depth changes over mm
+// in x and y, and the ray through it.
 fn area_of(slope: vec2f, ray: vec2f) -> f32 {
     return length(vec3f(slope, 1.0 + dot(ray, slope)));
 }

@@ -128,7 +128,8 @@ fn gathered(here: vec4f, pixel: vec2i, tile: Corner) -> Gathered {
     let rest = vec3f(tile.k00.a, tile.k10.a, tile.k01.a);
     let coarser = textureSampleLevel(coarser_mean, linear, tile.s2.zw, 0.0);
     let found = vec4f(coarser.rgb / max(coarser.a, 1e-3), coarser.a - 1e-3);
-    return with_coarser(light / mass, tile.wanted, rest, found);
+    let mean = light / max(mass, vec3f(LEAST_OWN * here.a));
+    return with_coarser(mean, tile.wanted, rest, found);
 }
 
 @fragment

@@ -95,8 +95,6 @@ override ONE_PROFILE: bool = false;
 const TILE = 8u;
 // How far from the plane a pixel may lie to be of the same surface, in mm a pixel of the level.
 const TOLERANCE = 2.0;
-// A pixel that is hardly of any surface still is of one.
-const LEAST_AREA = 1e-3;
 
 fn tile_of(instance: u32) -> vec2u {
     var place = level.first_tile + instance;
@@ -153,7 +151,7 @@ fn is_of(shape: vec2u, id: u32) -> bool {
     return ONE_PROFILE || shape.x >> 24u == id;
 }
 
-// Slopes are kept as sines.
+// Slopes are kept as sines, which are within ±1.
 fn packed(id: u32, z: f32, sines: vec2f) -> vec2u {
     let steps = vec2u(sines * 2047.0 + 2048.5);
     return vec2u((id << 24u) | (steps.y << 12u) | steps.x, bitcast<u32>(z));

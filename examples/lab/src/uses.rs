@@ -301,19 +301,21 @@ impl<'a> Seen<'a> {
             let own = ways * (1.0 - 1.0 / (side * side));
             let mm = facing_mm * side;
             let variance_px2 = variance * mm2 * side * side / (mm * mm) - own;
-            let reach = (TAPS * (CUT * variance_px2.max(0.15)).sqrt()).min(REACH);
             let slow = SLOW[usize::from(level > 0)];
             let apart = if fall(variance * mm2, m, own) < slow { 2 } else { 1 };
+            let part = if apart > 1 { SPARSE_TAPS } else { TAPS };
+            let reach = (part * (CUT * variance_px2.max(0.15)).sqrt()).min(REACH);
             let center = at / side - 0.5;
             let last = (DVec2::new(SIZE[0].into(), SIZE[1].into()) / side).floor() - 1.0;
             let (first, end) =
                 ((center - reach).ceil().max(DVec2::ZERO), (center + reach).floor().min(last));
+            let parity = center.x.round() as i32 + center.y.round() as i32;
             let (mut rows, mut pairs) = (0.0, 0.0);
             for y in first.y as i32..=end.y as i32 {
                 let half = (reach * reach - (f64::from(y) - center.y).powi(2)).max(0.0).sqrt();
                 rows += 1.0;
                 let first = (center.x - half).ceil().max(0.0) as i32;
-                let first = first + ((first + y) & (apart - 1));
+                let first = first + ((first + y + parity) & (apart - 1));
                 let row = (center.x + half).floor().min(last.x) - f64::from(first) + 1.0;
                 pairs += (0.5 * row.max(0.0) / f64::from(apart)).ceil();
             }
@@ -366,6 +368,7 @@ const ROWS_ONCE: f64 = 2.0 / 3.0;
 const REACH: f64 = 6.0;
 const CUT: f64 = 8.0;
 const TAPS: f64 = 0.8;
+const SPARSE_TAPS: f64 = 0.9;
 /// On the frame and on levels.
 const SLOW: [f64; 2] = [0.25, 0.35];
 

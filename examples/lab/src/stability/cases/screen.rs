@@ -52,8 +52,8 @@ fn layers(quick: bool) -> Vec<Case> {
     };
     let known = |plan, atlas| [known(PLAN, plan, COARSE), known(ATLAS, atlas, ISLANDS)];
     vec![
-        case(1.0).known(known(0.0365, 0.35)),
-        case(2.0).known(known(0.0435, 0.22)).pictured(false),
+        case(1.0).known(known(0.034, 0.35)),
+        case(2.0).known(known(0.042, 0.22)).pictured(false),
         case(5.0).known(known(0.0125, 0.025)),
         case(10.0).pictured(false),
         case(20.0),

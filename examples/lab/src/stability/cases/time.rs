@@ -336,7 +336,7 @@ fn turning_light(quick: bool) -> [Case; 2] {
     let cases: [(_, _, Figure); 2] =
         [("light turns: step", FLICKER, Track::step), ("light turns: error", GRADIENT, Track::worst)];
     let [step, error] = of_track(make, 48, what, cases);
-    let step = step.known([known(PLAN, if quick { 0.0037 } else { 0.0085 }, CLASSES_CHANGE)]);
+    let step = step.known([known(PLAN, if quick { 0.0025 } else { 0.0085 }, CLASSES_CHANGE)]);
     [step, error.known([known(PLAN, 0.0125, why)])]
 }
 
