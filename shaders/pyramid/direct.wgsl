@@ -45,7 +45,8 @@ const TAPS = 0.8;
 const WIDER = 1.02;
 // Where weights fall no faster than this, by k₀₀ + k₁₁ on the frame and on levels, every other pixel is left out, as
 // on a chessboard whose fields hold the nearest one: of a Gaussian of a square pixel that changes the sum by 2e-4, and
-// levels have no detail of a pixel. There taps go farther, since what ends with a step is not the same on both fields.
+// levels have no detail of a pixel. There taps go farther, since what ends with a step is not the same on both fields;
+// not where both layers are summed, whose Gaussians end so.
 const SLOW = vec2f(0.25, 0.35);
 const SPARSE_TAPS = 0.9;
 
@@ -167,7 +168,7 @@ fn summed(l: u32, center: vec2f, shape: Shape, plane: Plane, variance_mm2: f32, 
     let has_all = has_odd_pixels();
     let k = on_plane(variance_mm2 * select(WIDER, 1.0, has_all || l == 0u), plane.m, own);
     let slow = select(SLOW.y, SLOW.x, l == 0u);
-    let is_sparse = k.x + k.z < slow && !has_all;
+    let is_sparse = !BACK && !has_all && k.x + k.z < slow;
     // The ball, as it is seen.
     let mm = vec2f(plane.dx.x - plane.ray.x * plane.dx.z, plane.dy.y - plane.ray.y * plane.dy.z);
     let end = sqrt(CUT * max(variance_mm2 / (mm * mm) - own, vec2f(0.15)));

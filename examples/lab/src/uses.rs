@@ -179,8 +179,8 @@ impl<'a> Seen<'a> {
         let planar = pixels(0, 0);
         // Tiles do not say whether the square is summed in them: a share of the planar pixels, as the rows say.
         let square = (f64::from(planar) * self.share_with_square(plan)) as u32;
-        let trips = |level: usize, tiles: &[[u32; 2]]| {
-            self.trips(plan, level, tiles).map(|t| format!("{t:.2}")).to_vec()
+        let trips = |level: usize, tiles: &[[u32; 2]], has_back: bool| {
+            self.trips(plan, level, tiles, has_back).map(|t| format!("{t:.2}")).to_vec()
         };
         let (thin, direct): (Vec<_>, Vec<_>) =
             counted.direct[0].iter().partition(|tile| counted.has_back_near(**tile));
@@ -191,7 +191,11 @@ impl<'a> Seen<'a> {
             ("direct, two layers", thin.len() as u32 * TILE * TILE, &thin),
         ] {
             if on > 0 {
-                let trips = if tiles.is_empty() { String::new() } else { trips(0, tiles).join(" ") };
+                let trips = if tiles.is_empty() {
+                    String::new()
+                } else {
+                    trips(0, tiles, kind.ends_with("layers")).join(" ")
+                };
                 uses.add(method, &format!("frame {kind} {error}"), on, 0, "tiles", &trips);
             }
         }
@@ -200,7 +204,7 @@ impl<'a> Seen<'a> {
                 if on > 0 {
                     // A level sums its own Gaussians alone.
                     let trips = match kind {
-                        "direct" => trips(level, &counted.direct[level])[1..].join(" "),
+                        "direct" => trips(level, &counted.direct[level], false)[1..].join(" "),
                         _ => String::new(),
                     };
                     uses.add(method, &format!("down {kind}"), on, 0, "tiles", "");
@@ -251,12 +255,12 @@ impl<'a> Seen<'a> {
 
     /// How often the loops of direct.wgsl go round in direct tiles of a level: for each pixel the Gaussians that
     /// are summed, of each its rows, of each its pairs of taps.
-    fn trips(&self, plan: &Plan, level: usize, tiles: &[[u32; 2]]) -> [f64; 3] {
+    fn trips(&self, plan: &Plan, level: usize, tiles: &[[u32; 2]], has_back: bool) -> [f64; 3] {
         let skin = tiles
             .iter()
             .flat_map(|tile| pixels_of(*tile, TILE << level))
             .filter(|pixel| self.is_skin[*pixel]);
-        let sums: Vec<Vec<[f64; 2]>> = skin.map(|pixel| self.sums(plan, level, pixel)).collect();
+        let sums: Vec<Vec<[f64; 2]>> = skin.map(|pixel| self.sums(plan, level, pixel, has_back)).collect();
         let total = |i: usize| sums.iter().flatten().map(|sum| sum[i]).sum::<f64>();
         let count: usize = sums.iter().map(Vec::len).sum();
         // Of nothing that is summed there are no rows.
@@ -266,7 +270,7 @@ impl<'a> Seen<'a> {
 
     /// Rows and pairs of taps of the Gaussians that are summed directly at a pixel, as `gathered` in direct.wgsl has
     /// it; on a level as `fs_level` does, with the frame's pixels for those of the level.
-    fn sums(&self, plan: &Plan, on_level: usize, pixel: usize) -> Vec<[f64; 2]> {
+    fn sums(&self, plan: &Plan, on_level: usize, pixel: usize, has_back: bool) -> Vec<[f64; 2]> {
         let Scale { mm2, m, rows: [row, next] } = self.scale(plan, pixel);
         let (row, next) = (&plan.rows(0)[row], &plan.rows(0)[next]);
         let at = DVec2::new((pixel as u32 % SIZE[0]).into(), (pixel as u32 / SIZE[0]).into()) + 0.5;
@@ -302,7 +306,7 @@ impl<'a> Seen<'a> {
             let mm = facing_mm * side;
             let variance_px2 = variance * mm2 * side * side / (mm * mm) - own;
             let slow = SLOW[usize::from(level > 0)];
-            let apart = if fall(variance * mm2, m, own) < slow { 2 } else { 1 };
+            let apart = if !has_back && fall(variance * mm2, m, own) < slow { 2 } else { 1 };
             let part = if apart > 1 { SPARSE_TAPS } else { TAPS };
             let reach = (part * (CUT * variance_px2.max(0.15)).sqrt()).min(REACH);
             let center = at / side - 0.5;

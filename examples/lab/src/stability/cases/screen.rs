@@ -118,7 +118,7 @@ fn silhouettes(quick: bool) -> Vec<Case> {
     };
     let why = "The part is 6 px wide, and most of its area lies in the outer pixels, whose area \
         follows from a guessed slope. Use texture space.";
-    let thin = [known(EXACT, 0.033, why), known(PLAN, 0.045, why)];
+    let thin = [known(EXACT, 0.033, why), known(PLAN, 0.046, why)];
     let finger = |light| case("a finger", 8.0, [160, 64], [96, 72], light);
     let rim = |light| case("the rim of an ear", 0.75, [40, 160], [32, 24], light).known(thin);
     vec![finger(0.0), finger(4.0).pictured(false), rim(0.0), rim(4.0).pictured(false)]
@@ -163,7 +163,7 @@ fn border(quick: bool) -> Vec<Case> {
     vec![
         whole("an edge at the border", [192; 2], edge, 0.24),
         seen("an edge at the border", edge, 0.014),
-        whole("half a head", [160; 2], head, 0.065),
+        whole("half a head", [160; 2], head, 0.066),
         seen("half a head", head, 0.015),
     ]
 }

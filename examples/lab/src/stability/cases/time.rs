@@ -120,7 +120,7 @@ fn over_a_sphere(quick: bool) -> Case {
         };
         followed.swing(lab, View::orthographic([112; 2], PX_PER_MM), &pan(quick))
     })
-    .known([known(PLAN, 0.0053, CLASSES_CHANGE)])
+    .known([known(PLAN, 0.0058, CLASSES_CHANGE)])
 }
 
 /// A dark layer before a lit one, and points beside its edge.
