@@ -44,9 +44,9 @@ const CUT = 8.0;
 const TAPS = 0.8;
 const WIDER = 1.02;
 // Where weights fall no faster than this, by k₀₀ + k₁₁ on the frame and on levels, every other pixel is left out, as
-// on a chessboard whose fields hold the nearest one: of a Gaussian of a square pixel that changes the sum by 2e-4, and
-// levels have no detail of a pixel. There taps go farther, since what ends with a step is not the same on both fields;
-// not where both layers are summed, whose Gaussians end so.
+// on a chessboard whose fields hold the nearest one. Of a whole Gaussian of a square pixel that changes the sum by
+// 2e-4, and levels have no detail of a pixel. One that ends with a step weighs more on one of the fields: so taps go
+// farther there, and the Gaussians of two layers, whose step is larger, take all pixels.
 const SLOW = vec2f(0.25, 0.35);
 const SPARSE_TAPS = 0.9;
 

@@ -18,7 +18,7 @@ use crate::{Error, Frame, Output, Profile};
 use back::Back;
 pub(crate) use passes::OVERLAY;
 use passes::{LIGHT, OverTiles, Passes};
-use scratch::{CLASSES, DRAW_BYTES, Scratch};
+use scratch::{CLASSES, DRAW_BYTES, SIDE, Scratch};
 
 /// What doubt (`list_tiles.wgsl`) there may be in a tile for it to be planar, over the error of the plan: of the frame,
 /// and of its levels. Found on heads: beyond, errors grow.
@@ -400,8 +400,7 @@ impl Pyramid {
             let mut pass = recorder.dispatch("subsurface::pyramid pack");
             pass.set_pipeline(&passes.pack.pipeline);
             pass.set_bind_group(0, &groups.pack, &[]);
-            // Of four tiles each.
-            let packing = base.tiles.map(|count| count.div_ceil(2));
+            let packing = base.tiles.map(|count| count.div_ceil(SIDE));
             pass.dispatch_workgroups(packing[0], packing[1], 1);
             if let Some(back) = &groups.back {
                 back.pack(&mut pass, &passes.pack_back, packing);

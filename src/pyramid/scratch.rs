@@ -10,6 +10,8 @@ use crate::plan::{Kinds, MAX_LEVELS, Shape, Weights, own_blur};
 
 /// Side of a tile, in pixels of its level.
 pub(super) const TILE: u32 = 8;
+/// Tiles along a side of what a workgroup packs.
+pub(super) const SIDE: u32 = 2;
 
 /// `View` of the shaders.
 #[repr(C)]
@@ -327,7 +329,7 @@ fn level_settings(plan: &Weights, l: usize, last: usize, level: &LevelScratch) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pyramid::passes::{DIRECT, LIST_TILES, PLANAR};
+    use crate::pyramid::passes::{DIRECT, LIST_TILES, PACK, PLANAR};
     use crate::wgsl::assert_layout;
 
     #[test]
@@ -347,6 +349,7 @@ mod tests {
         ] {
             assert!(shader.contains(&constant), "{constant}");
         }
+        assert!(PACK.concat().contains(&format!("const SIDE = {SIDE}u;")));
     }
 
     #[test]
